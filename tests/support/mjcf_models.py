@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kincheck.core.algebra import X, Y, Z
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.trees.reader import read_tree
+from kincheck.core.extensions.trees.reader import read_tree
 
 from .model_poses import EXACT, near
 

@@ -1,9 +1,5 @@
-"""Datasets of Adams Solver (.adm)."""
+"""Datasets of Adams Solver (.adm), read into cases."""
 
 from ...doors import Extension
 
-EXTENSION = Extension(
-    "kincheck.core.case.models.adams",
-    needs=("trees",),
-    readers={"dataset": "reader:DATASET"},
-)
+EXTENSION = Extension(__name__, needs=["explain", "trees"], readers={"dataset": "reader:DATASET"})

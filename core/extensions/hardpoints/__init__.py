@@ -1,11 +1,19 @@
-"""Suspensions by their hardpoints: tables, trees, files of other programs."""
+"""Cases from hardpoints: files of named points, as suspension engineers use them, and templates of
+suspensions.
+"""
 
 from ...doors import Extension
 
 EXTENSION = Extension(
-    "kincheck.core.case.models.hardpoints",
+    __name__,
+    commands={"templates": "command:PrintTemplates"},
+    completions={"template": "templates:TEMPLATES"},
     readers={
-        name.lower(): f"reader:{name}"
-        for name in ("CHRONO", "ADAMS", "ASSETTO", "TABLE", "TREE", "WORKBOOK")
+        "chrono": "reader:CHRONO",
+        "adams_car": "reader:ADAMS",
+        "assetto": "reader:ASSETTO",
+        "table": "reader:TABLE",
+        "tree": "reader:TREE",
+        "workbook": "reader:WORKBOOK",
     },
 )

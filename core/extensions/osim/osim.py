@@ -22,11 +22,14 @@ from ...algebra import IDENTITY, Quat, Vec3, X, Y, Z
 from ...case.io.document import fault, read_text, shown
 from ...case.io.element import ZEROS, Element, parse_xml, words
 from ...case.io.readers import LARGEST_FILE
-from ...case.models.trees.graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
-from ...case.models.trees.masses import mass_in
-from ...case.models.trees.place import ORIGIN, Place, turn_about, unit_quaternion
-from ...case.models.trees.robot_elements import HALFWAY
-from ...case.models.trees.tree import (
+from ...errors import KincheckError
+from ...extras import library
+from ...joints import PiecewisePolynomial, Spline
+from ..trees.graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
+from ..trees.masses import mass_in
+from ..trees.place import ORIGIN, Place, turn_about, unit_quaternion
+from ..trees.robot_elements import HALFWAY
+from ..trees.tree import (
     NO_LIMIT,
     BushingLaw,
     Closure,
@@ -39,9 +42,6 @@ from ...case.models.trees.tree import (
     Tree,
     require_spline,
 )
-from ...errors import KincheckError
-from ...extras import library
-from ...joints import PiecewisePolynomial, Spline
 
 VERSION_4 = 40_000
 """Oldest version of documents that are read as they are."""

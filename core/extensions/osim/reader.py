@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ...case.models.trees.reader import TreeReader
+from ..trees.reader import TreeReader
 
 if TYPE_CHECKING:
     from ...case.io.element import Element
-    from ...case.models.trees.tree import Tree
+    from ..trees.tree import Tree
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,13 @@
-"""Models of links: MJCF, URDF and SDF."""
+"""Models of links in files of other programs: MJCF, URDF and SDF, read into one tree of
+links.
+
+A reader of another format fills a `Tree`, outer links first, or a `Graph` of links and joints in
+any order, which is hung up as a tree. `case.case_of` makes the case of a tree. Messages name an
+`Element`: a place in the file, by its line or in words.
+"""
 
 from ...doors import Extension
 
 EXTENSION = Extension(
-    "kincheck.core.case.models.trees",
-    readers={name.lower(): f"reader:{name}" for name in ("MJCF", "URDF", "SDF")},
+    __name__, readers={"mjcf": "reader:MJCF", "urdf": "reader:URDF", "sdf": "reader:SDF"}
 )

@@ -19,17 +19,19 @@ from typing import cast
 
 from ...algebra import X, Y, Z, cross, quat, vec
 from ...case.io.element import ZEROS, Element, words
-from ...case.models.trees.graph import FramedFreedom, FramedJoint, Graph, global_frames, join
-from ...case.models.trees.masses import COLLIDER, StageMasses
-from ...case.models.trees.place import (
+from ...errors import remedy, shortened, similar
+from ...mechanism.mechanism import Vector
+from ..trees.graph import FramedFreedom, FramedJoint, Graph, global_frames, join
+from ..trees.masses import COLLIDER, StageMasses
+from ..trees.place import (
     Place,
     coordinates,
     rotation_vector,
     turn_of_axes,
     unit_quaternion,
 )
-from ...case.models.trees.robot_elements import mimic
-from ...case.models.trees.tree import (
+from ..trees.robot_elements import mimic
+from ..trees.tree import (
     INFINITE,
     NO_LIMIT,
     UNKNOWNS,
@@ -40,8 +42,6 @@ from ...case.models.trees.tree import (
     Tree,
     limit_of,
 )
-from ...errors import remedy, shortened, similar
-from ...mechanism.mechanism import Vector
 from .usd_stage import UNITS
 
 AXES = {"X": X, "Y": Y, "Z": Z}
