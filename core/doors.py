@@ -44,6 +44,7 @@ class Extension:
         engines: class of each engine in projection mode.
         simulations: function without arguments that returns each engine in simulate mode.
         readers: readers of files; see `case.io.readers.Reader`.
+        sources: options added to commands that run engines; see `cli.engine_source.EngineSource`.
         writers: function that writes a mechanism in each format; see `case.io.model_writer`.
         formats: who reads each format, for the help.
         converters: function from a model's file to the text that a simulator saves.
@@ -60,6 +61,7 @@ class Extension:
     engines: _Table = field(default_factory=dict[str, str])
     simulations: _Table = field(default_factory=dict[str, str])
     readers: _Table = field(default_factory=dict[str, str])
+    sources: _Table = field(default_factory=dict[str, str])
     writers: _Table = field(default_factory=dict[str, str])
     formats: _Table = field(default_factory=dict[str, str])
     converters: _Table = field(default_factory=dict[str, str])

@@ -90,16 +90,7 @@ core/case/io/outputs.py core/extensions/hardpoints/suspension/base.py
 core/case/io/outputs.py core/extensions/hardpoints/suspension_section.py
 core/case/io/reference_curve.py core/extensions/hardpoints/suspension/__init__.py
 core/case/io/schema.py core/extensions/hardpoints/suspension/__init__.py
-core/cli/checks.py core/extensions/recorded/engine.py
-core/cli/run.py core/extensions/cluster/distributed.py
 core/cli/run.py core/extensions/laboratory/bench/engines.py
-core/cli/shared_options.py core/extensions/cluster/distributed.py
-core/cli/shared_options.py core/extensions/recorded/engine.py
-core/cli/shared_options.py core/extensions/recorded/fmu.py
-core/cli/shared_options.py core/extensions/recorded/meaning.py
-core/cli/shared_options.py core/extensions/recorded/readers.py
-core/cli/shared_options.py core/extensions/recorded/samples.py
-core/cli/shared_options.py core/extensions/recorded/sweep.py
 core/harness/scene.py core/extensions/hardpoints/suspension/__init__.py
 core/harness/suspects.py core/extensions/hardpoints/suspension/__init__.py
 core/kinematics/motion_solver.py core/extensions/blocks/component_lanes.py
