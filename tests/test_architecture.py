@@ -93,9 +93,6 @@ core/case/io/schema.py core/extensions/hardpoints/suspension/__init__.py
 core/cli/run.py core/extensions/laboratory/bench/engines.py
 core/harness/scene.py core/extensions/hardpoints/suspension/__init__.py
 core/harness/suspects.py core/extensions/hardpoints/suspension/__init__.py
-core/kinematics/motion_solver.py core/extensions/blocks/component_lanes.py
-core/kinematics/motion_solver.py core/extensions/blocks/sparse_lanes.py
-core/kinematics/motion_solver.py core/extensions/blocks/sweep.py
 """
 """Modules of extensions that files of the kernel still import: this list only gets shorter."""
 

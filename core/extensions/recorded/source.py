@@ -72,7 +72,8 @@ class Recordings(EngineSource):
         options: Any, cases: Sequence[Case], problems: list[str]
     ) -> tuple[list[Case], list[Engine]]:
         """Return the case at the samples of its recordings, and all programs as engines."""
-        cases, found = [*cases], list[Engine]()
+        found: list[Engine] = []
+        cases = [*cases]
         if options.recorded and len(cases) != 1:
             problems.append(
                 f"{options.recorded[0]}: found {len(cases)} cases, expected the one that it records"
