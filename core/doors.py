@@ -45,6 +45,7 @@ class Extension:
         simulations: function without arguments that returns each engine in simulate mode.
         readers: readers of files; see `case.io.readers.Reader`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
+        sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
         sources: options added to commands that run engines; see `cli.engine_source.EngineSource`.
         writers: function that writes a mechanism in each format; see `case.io.model_writer`.
         formats: who reads each format, for the help.
@@ -64,6 +65,7 @@ class Extension:
     simulations: _Table = field(default_factory=dict[str, str])
     readers: _Table = field(default_factory=dict[str, str])
     methods: _Table = field(default_factory=dict[str, str])
+    sections: _Table = field(default_factory=dict[str, str])
     sources: _Table = field(default_factory=dict[str, str])
     writers: _Table = field(default_factory=dict[str, str])
     formats: _Table = field(default_factory=dict[str, str])

@@ -83,16 +83,7 @@ IMPORTS = {
 """Folder of the kernel in core: the folders it imports besides itself, whenever the import runs."""
 
 STILL = """
-core/case/io/case_file.py core/extensions/hardpoints/suspension_section.py
-core/case/io/catalogue.py core/extensions/hardpoints/suspension/__init__.py
-core/case/io/outputs.py core/extensions/hardpoints/suspension/__init__.py
-core/case/io/outputs.py core/extensions/hardpoints/suspension/base.py
-core/case/io/outputs.py core/extensions/hardpoints/suspension_section.py
-core/case/io/reference_curve.py core/extensions/hardpoints/suspension/__init__.py
-core/case/io/schema.py core/extensions/hardpoints/suspension/__init__.py
 core/cli/run.py core/extensions/laboratory/bench/engines.py
-core/harness/scene.py core/extensions/hardpoints/suspension/__init__.py
-core/harness/suspects.py core/extensions/hardpoints/suspension/__init__.py
 """
 """Modules of extensions that files of the kernel still import: this list only gets shorter."""
 

@@ -14,7 +14,7 @@ from ..options import (
     verbosity,
     whole,
 )
-from .engine_source import CHECK_ENGINE, options_for, sources
+from .engine_source import CHECK_ENGINE, names_of, options_for, sources
 from .parser import Command
 from .registry import Registry, Status
 from .shared_options import TOL
@@ -92,11 +92,13 @@ class CheckEngine(_Added):  # pyright: ignore[reportUntypedBaseClass]
         from ..report.progress import progress
         from ..studies.checks.check_engine import check_engine
 
-        problems = list[str]()
-        added = [source.engines(self, [], problems)[1] for source in sources(CHECK_ENGINE)]
-        named = [*([] if self.engine is None else [self.engine]), *chain(*added)]
-        if len(named) != 1:
+        added = sources(CHECK_ENGINE)
+        options = ["engine", *chain.from_iterable(map(names_of, added))]
+        if sum(getattr(self, name) is not None for name in options) != 1:
             raise KincheckError(NAME_ONE)
+        problems = list[str]()
+        named: list[Any] = [] if self.engine is None else [self.engine]
+        named += chain.from_iterable(source.engines(self, [], problems)[1] for source in added)
         found = registry.find_engines(named, problems)
         refuse(problems)
         cases = {word: registry.case(name) for word, name in TOPOLOGIES.items()}

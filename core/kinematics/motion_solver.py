@@ -1,5 +1,5 @@
-"""Make a mechanism ready for its motion along a path: as one program, or by a method for large
-mechanisms that an extension offers.
+"""Make a mechanism ready for its motion along a path: as one program, or by the method of an
+extension for large mechanisms.
 
 The solutions and verdicts are the same to round-off. One program costs least for each sample, and
 most to trace and compile: its size grows faster than the mechanism.
@@ -40,7 +40,7 @@ class Method(StrEnum):
 
 
 def by_method(method: Method) -> Callable[[Mechanism, Request], Callable[[Path], Solver]] | None:
-    """Return what makes large mechanisms ready for paths; None if no extension does."""
+    """Return the preparation of large mechanisms for paths; None without its extension."""
     offer = offers("methods").get(method.value)
     return offer and offer.load()
 

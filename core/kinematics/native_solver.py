@@ -238,7 +238,7 @@ class PreparedDesigns:
 
     Attributes:
         route: the path made ready for the compiled model.
-        wanted: the forces that are wanted; None without any.
+        wanted: the wanted forces; None without any.
     """
 
     route: Route
@@ -282,7 +282,7 @@ class PreparedDesigns:
         return [found.kept[rows[f"{label} {point}"]] for label in QUANTITIES[:orders]]
 
     def pose(self, found: Variants, body: str) -> Array:
-        """Return origin [m] and Euler parameters of a body that was asked for, shape (7, n, V)."""
+        """Return origin [m] and Euler parameters of a requested body, shape (7, n, V)."""
         rows = self.route.model.rows
         return np.concatenate([found.kept[rows[f"{each} {body}"]] for each in "rp"])
 
@@ -290,7 +290,7 @@ class PreparedDesigns:
         """Return the forces of solved designs; None where none are wanted.
 
         Args:
-            found: what `solve` returns for the geometry.
+            found: the result of `solve` for the geometry.
         """
         if self.wanted is None:
             return None

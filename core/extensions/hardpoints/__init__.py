@@ -8,6 +8,7 @@ EXTENSION = Extension(
     __name__,
     commands={"templates": "command:PrintTemplates"},
     completions={"template": "templates:TEMPLATES"},
+    sections={"suspension": "suspension_section:SECTION"},
     readers={
         "chrono": "reader:CHRONO",
         "adams_car": "reader:ADAMS",

@@ -18,7 +18,7 @@ import numpy as np
 from ...algebra import vec
 from ...case.case import Case, Hardpoint, Quantity, Sweep, size
 from ...case.io.document import decimal, fault, interval, measure, require_known, shown
-from ...case.io.outputs import default, with_all_coordinates, with_slopes
+from ...case.io.outputs import default, with_all_coordinates
 from ...case.io.schema import MOST_SAMPLES
 from ...case.quantity import AXES, with_markers
 from ...case.units import LENGTHS
@@ -32,6 +32,7 @@ from .options import WheelOptions
 from .suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
 from .suspension.corner import MARKER_DISTANCE
 from .suspension.wheel import Place
+from .suspension_section import with_slopes
 from .table import Axes, HardpointTable
 from .templates import TIEROD_INNER, WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
 

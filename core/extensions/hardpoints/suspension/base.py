@@ -11,17 +11,19 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from ....algebra import Vec3
 from ....case.case import HELD_BUT, PER_TRAVEL
-from ....case.quantity import HIDDEN, PoseQuantity, TypedQuantity
+from ....case.io.schema import one_of
+from ....case.quantity import HIDDEN, Derived, TypedQuantity
 from ....jet import Jet, where
 from ....mechanism.mechanism import Mechanism, Point
-from .corner import Corner, Vehicle
+from .corner import Corner, Side, Vehicle
 
+_SIDES: Any = Annotated[Side, one_of(Side)]
 # Samples with a wheel speed below this fraction of the fastest point's speed are left out: a
 # quotient by the travel speed has lost three digits of its rates there, and more at lower speeds.
 STILL = 1e-3
@@ -32,12 +34,11 @@ class SuspensionOutput(TypedQuantity):
     """A quantity of a wheel or an axle, judged, reported and compared like any other output.
 
     Attributes:
-        needs: vehicle attributes that are optional in general, but required here.
         reads: vehicle attributes with the names of the points it reads.
         atol, rtol: an error is accepted up to atol [unit] + rtol * range of the reference.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ()
+    further: ClassVar[Mapping[str, tuple[Any, Any]]] = {"side": (_SIDES | None, None)}
     reads: ClassVar[tuple[str, ...]]
     registry: ClassVar[dict[str, type[SuspensionOutput]]] = {}
 
@@ -81,6 +82,11 @@ class SuspensionOutput(TypedQuantity):
     def problem(self) -> str:
         """Reason why this wheel has no such output: found, expected, remedy. Otherwise empty."""
         return ""
+
+    @property
+    def side(self) -> str:
+        """Side of its wheel, or of the first wheel of its axle."""
+        return str(self.vehicle.side)
 
     @property
     def signs(self) -> str:
@@ -178,7 +184,7 @@ def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
 
 
 @dataclass(frozen=True)
-class PerTravel(PoseQuantity):
+class PerTravel(Derived):
     """The derivative of an output by wheel travel (jounce): the upward displacement of the wheel
     centre relative to the vehicle's body.
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from ....algebra import Scalar, Vec3, cross, vec
 from ....case.case import MARKER
+from ....case.quantity import Convention
 from ....jet import Jet, arctan2, doubles, each, norm, sqrt, where
 from ....mechanism.mechanism import Mechanism, Vector
 from ....trajectory import Array
@@ -30,31 +31,6 @@ from ....trajectory import Array
 # Distance from the wheel centre to the markers on the wheel carrier [m]: a rim's radius, so
 # directions keep all digits of positions.
 MARKER_DISTANCE = 0.25
-
-
-class Convention(StrEnum):
-    """Standard of the axes and signs of outputs. SAE J670 also allows z up; here its name means the
-    historical z down.
-    """
-
-    ISO_8855 = "iso8855"
-    SAE_J670 = "sae_j670"
-
-    @property
-    def words(self) -> str:
-        """Standard and its axes, in words."""
-        return (
-            "ISO 8855 (x forward, y left, z up)"
-            if self is Convention.ISO_8855
-            else "SAE J670 (x forward, y right, z down)"
-        )
-
-    @property
-    def up(self) -> int:
-        """Factor from an upward component to one along z, and from a leftward component to one
-        along y.
-        """
-        return 1 if self is Convention.ISO_8855 else -1
 
 
 class Side(StrEnum):
