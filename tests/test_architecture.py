@@ -83,7 +83,6 @@ IMPORTS = {
 """Folder of the kernel in core: the folders it imports besides itself, whenever the import runs."""
 
 STILL = """
-core/cli/run.py core/extensions/laboratory/bench/engines.py
 """
 """Modules of extensions that files of the kernel still import: this list only gets shorter."""
 

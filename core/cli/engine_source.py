@@ -57,6 +57,15 @@ class EngineSource(Command):
         return [*cases], []
 
     @staticmethod
+    def efforts(options: Any) -> Any:
+        """Return the work-precision data for the report, a list of efforts by case; None without.
+
+        Raises:
+            KincheckError: their file cannot be read.
+        """
+        return None
+
+    @staticmethod
     def unreachable(options: Any) -> list[str]:
         """Return why the workers cannot be reached: the last check before the work, which takes
         time.
@@ -84,8 +93,8 @@ def options_for(command: str) -> Any:
 
 
 def names_of(source: type[EngineSource]) -> list[str]:
-    """Return the names of the options of a source."""
-    return [each.name for each, *_ in option_fields(source)]
+    """Return the names of the options of a source, without destinations of results."""
+    return [each.name for each, *_ in option_fields(source) if each.init]
 
 
 def given(options: Any, which: str) -> bool:

@@ -26,6 +26,7 @@ from ..options import (
     joint_types,
     json_file,
     option,
+    option_fields,
     options,
     positive,
     several,
@@ -84,6 +85,7 @@ class Run(Isolated, _Added):  # pyright: ignore[reportUntypedBaseClass]
     """
 
     about = "solve cases with engines and judge the results"
+    LAST = (*Isolated.LAST, *(each.name for each, *_ in option_fields(_Added) if not each.init))
     cases: str | Path | Case | Sequence[str | Path | Case] | None = argument(
         CASES, "CASE", "*", default=()
     )
@@ -107,9 +109,6 @@ class Run(Isolated, _Added):  # pyright: ignore[reportUntypedBaseClass]
         default=TOL,
     )
     out: Path | None = destination("write results.json and report.html there", Path, "DIR")
-    bench: Path | None = destination(
-        "show the work-precision data of this bench.json in the report", Path
-    )
     json: str | None = json_file()
     csv: Path | None = destination(f"{CURVES} as CSV", Path)
     parquet: Path | None = destination(f"{CURVES} as Parquet", Path)
@@ -188,11 +187,7 @@ class Run(Isolated, _Added):  # pyright: ignore[reportUntypedBaseClass]
 
         self = _with_cases(self, registry)
         plan = _plan_run(self, registry)
-        precision: Any = None
-        if self.bench is not None:
-            from ..extensions.laboratory.bench.engines import efforts_in
-
-            precision = efforts_in(self.bench)
+        precision = next(filter(None, (each.efforts(self) for each in sources(RUN))), None)
         with delivery.json_only() if self.json == "-" else nullcontext():
             results, problems, keeping, stopped = _solve(self, plan)
         if self.out or self.json or keeping:
@@ -250,8 +245,6 @@ def _plan_run(options: Run, registry: Registry) -> _Plan:
     problems: list[str] = shared_options.contradictions(options)
     if options.resume and options.history is None:
         problems.append(f"--resume needs a history. Give --history FILE, or set {HISTORY}.")
-    if options.bench is not None and options.out is None:
-        problems.append("--bench adds to the report. Give --out DIR.")
     tell: Callable[[Iterable[str]], object] = complain if options.command else list
     unread: dict[str, str] = {}
     cases = _cases(options, registry, unread)
