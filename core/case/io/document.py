@@ -457,7 +457,9 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
     for name in table:
         if name not in fields:
             close = similar(name, fields)
-            advice = f"did you mean {close!r}?" if close else "remove it"
+            further = not key and isinstance(table[name], dict)  # tables come by extensions
+            remove = f"remove it{', or install the extension that reads it' * further}"
+            advice = f"did you mean {close!r}?" if close else remove
             problem = f"unknown key, expected one of {', '.join(fields)}; {advice}"
             raise fault(file, join(key, name), problem)
     for name, field in fields.items():
