@@ -144,7 +144,7 @@ def root_of(file: Path) -> Element:
 
 
 def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
-    """Return the links of a model, in the format that its root names.
+    """Return the links of a model, in the format of its root.
 
     Args:
         without: elements to leave out, by tag, name or TAG/NAME; the tree has those it found.
@@ -163,7 +163,7 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
 
 
 def require_used(file: Path, without: Collection[str], used: Collection[str]) -> None:
-    """Refuse names of elements to leave out that a model does not have.
+    """Refuse names of elements to leave out, of which a model has none.
 
     Raises:
         CaseError: there is one.
