@@ -187,7 +187,8 @@ class Run(Isolated, _Added):  # pyright: ignore[reportUntypedBaseClass]
 
         self = _with_cases(self, registry)
         plan = _plan_run(self, registry)
-        precision = next(filter(None, (each.efforts(self) for each in sources(RUN))), None)
+        data: list[Any] = [each.efforts(self) for each in sources(RUN)]
+        precision: Any = next(filter(None, data), None)
         with delivery.json_only() if self.json == "-" else nullcontext():
             results, problems, keeping, stopped = _solve(self, plan)
         if self.out or self.json or keeping:
