@@ -139,10 +139,14 @@ def solver(options: Isolated, engines: Sequence[Engine]) -> tuple[Solver, dict[s
 
 
 def return_cases(cases: Sequence[T], supplied: Supplied) -> tuple[list[T | str], Supplied]:
-    """Return cases and facts with the files of --hold, --start and --without among the cases: these
-    options take several names, and in `run --hold knee hip model.xml` also the file.
+    """Return cases and facts with the files among the names of options such as --hold among the
+    cases: these take several names, and in `run --hold knee hip model.xml` also the file.
     """
-    given = {name: getattr(supplied, name) for name in ("hold", "start", "without")}
+    given = {
+        each.name: getattr(supplied, each.name)
+        for each, meaning, _ in option_fields(type(supplied))
+        if meaning and meaning.action == "extend"
+    }
     files = [name for each in given.values() for name in each if os.path.isfile(name)]
     left = {
         option: tuple(name for name in each if name not in files) for option, each in given.items()
