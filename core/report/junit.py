@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from xml.etree import ElementTree
 
+from ..errors import labelled
 from ..harness.compare import describe
 from ..harness.engine import STANDARD
 from ..harness.labels import UNMADE, notes, suspects
@@ -50,7 +51,7 @@ def to_junit(results: Results) -> bytes:
             if name == case:
                 test = _test(suite, (case, engine, mode), "not run")
                 ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
-        lines = [f"note: {note}" for named, note in notes(results.run) if named == case]
+        lines = [labelled(note) for named, note in notes(results.run) if named == case]
         lines += [f"suspect: {why}" for named, why in suspects(results) if named == case]
         if lines:
             ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub(

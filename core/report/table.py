@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ..case.io.escape import visible
+from ..errors import labelled
 from ..harness.labels import (
     against,
     motion_unit,
@@ -222,7 +223,7 @@ def print_signs(run: Facts, console: Console) -> None:
 def print_messages(results: Results, console: Console) -> None:
     """Print notes on the cases, suspicions, every message, and a count of outcomes."""
     for case, note in notes(results.run):
-        console.print(Text(visible(f"note: {case}: {note}")), soft_wrap=True)
+        console.print(Text(visible(labelled(note, case))), soft_wrap=True)
     for case, why in suspects(results):
         console.print(Text(visible(f"suspect: {case}: {why}"), style="bold"), soft_wrap=True)
     said = list[str]()
@@ -364,7 +365,8 @@ def to_markdown(results: Results) -> str:
         lines.append(row([code(case), *cells]))
     lines += ["", f"{escape_markdown(_legend(results))}."]
     lines += [escape_markdown(f"{sentence}.") for sentence in [unread(results.run)] if sentence]
-    lines += [escape_markdown(f"Note: {case}: {note}.") for case, note in notes(results.run)]
+    told = [labelled(note, case) for case, note in notes(results.run)]
+    lines += [escape_markdown(f"{each[:1].upper()}{each[1:]}.") for each in told]
     lines += [escape_markdown(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
         escape_markdown(

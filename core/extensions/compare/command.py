@@ -11,7 +11,7 @@ from ...case.io.reader_options import Supplied
 from ...cli.parser import Command
 from ...cli.registry import Registry, Status, tell_left_out
 from ...cli.shared_options import TOL
-from ...errors import KincheckError, collect_errors, refuse
+from ...errors import KincheckError, collect_errors, labelled, refuse
 from ...options import (
     argument,
     destination,
@@ -94,7 +94,7 @@ class Compare(Command):
             refuse(unsolved)
         if self.command:
             tell_left_out(cases)
-            complain(f"note: {case.name}: {note}" for case in cases for note in case.assembly)
+            complain(labelled(note, case.name) for case in cases for note in case.assembly)
         accepted = _tolerances_of(self.tolerance, Path(_name_of(self.cases[0])), designs)
         return designs, views.exceeded(designs, accepted), unsolved
 
