@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...case.io.readers import WORKBOOKS, Reader, ReaderOptions, text_of
-from .options import HardpointOptions, WheelOptions
+from .options import NOTHING, HardpointOptions, WheelOptions
 
 if TYPE_CHECKING:
     from ...case.case import Case
@@ -46,7 +46,7 @@ def is_table(file: Path, supplied: WheelOptions) -> bool:
     return isinstance(reader_of(file, supplied), HardpointReader)
 
 
-def read_hardpoints(file: Path, supplied: WheelOptions) -> HardpointTable:
+def read_hardpoints(file: Path, supplied: WheelOptions = NOTHING) -> HardpointTable:
     """Read the table of hardpoints of a file.
 
     Raises:
