@@ -142,7 +142,9 @@ class MeasureCompliance(Isolated):
             print(*views.lines(results), sep="\n", file=console.file)
             if checked is not None:
                 print_table(checked, console.file, reactions=True)
-            complain(labelled(note) for note in (*case.assembly, *results.travel.notes))
+            every = results.travel, *results.loads.values()
+            notes = (*case.assembly, *(note for each in every for note in each.notes))
+            complain(labelled(note) for note in dict.fromkeys(notes))
         named = [each.name for each in engines if each.name != STANDARD]
         problems += views.failures(results)
         problems += missing_requirements(checked, (), named) if checked else []
