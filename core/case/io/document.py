@@ -438,7 +438,9 @@ class Section:
         for name in self.table:
             if name not in known:
                 close = similar(name, known)
-                advice = f"did you mean {close!r}?" if close else "remove it"
+                further = not self.key and isinstance(self.table[name], dict)
+                remove = f"remove it{', or install the extension that reads it' * further}"
+                advice = f"did you mean {close!r}?" if close else remove
                 raise self.at(name).fault(
                     f"unknown key, expected {'one of ' * (len(known) > 1)}{', '.join(known)};"
                     f" {advice}"

@@ -37,6 +37,7 @@ from ..curves import (
 )
 from ..units import Convert, FileUnits, Unit
 from .document import fault, shown, toml_table
+from .readers import WORKBOOKS
 from .reference_file import SAME_GRID, read, series, sha256
 from .reference_samples import (
     RATES,
@@ -49,7 +50,6 @@ from .reference_samples import (
     samples_of,
 )
 from .schema import DIGEST, ReferenceKeys
-from .table import WORKBOOKS
 
 PROVED = ".json"
 """Suffix of the files of proved references."""

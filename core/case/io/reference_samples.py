@@ -26,11 +26,11 @@ from ..case import PER_TRAVEL, Quantity
 from ..curves import Printed
 from ..units import Convert, FileUnits, Unit, si_of
 from .document import LARGEST, SMALLEST, fault, number_or_nan, read_text, shown
+from .readers import WORKBOOKS
 from .schema import ReferenceKeys
 from .table import (
     DELIMITERS,
     LARGEST_FILE,
-    WORKBOOKS,
     Cell,
     Table,
     find_decimal_sign,

@@ -27,7 +27,6 @@ from ..units import ANGLES, LENGTHS, Unit
 from .document import decimal, fault, read_bytes, shown
 from .foreign import ARCHIVE, EXCEL, binary, recognise_format, too_large
 
-WORKBOOKS = (".xlsx", ".xlsm")
 DELIMITERS = ";\t,"
 Cell: TypeAlias = str | float
 """A cell: a text, empty for an empty cell, or a number of a workbook."""

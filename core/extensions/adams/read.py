@@ -8,11 +8,12 @@ from ...case.case import Case, Truth
 from ...case.closing import within_digits
 from ...case.io.document import explained, fault
 from ...case.io.outputs import with_all_motions
-from ...case.io.reader_options import LEFT_OUT, WITHOUT, Supplied
+from ...case.io.readers import LEFT_OUT, WITHOUT
 from ...errors import shortened
 from ...kinematics import degrees_of_freedom
 from ...mechanism.body import Body
 from ...mechanism.mechanism import Mechanism, Point, Vector
+from ..trees.options import DrivingOptions
 from .constraints import (
     ADDED_UP,
     CLOSED,
@@ -32,7 +33,7 @@ from .model import Model, Units, read_bodies, read_markers, read_places, read_un
 _LONGEST_TITLE, _MOST_NAMED = 80, 12
 
 
-def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
+def read_adams(file: Path, text: str, supplied: DrivingOptions) -> Case:
     """Return the case of a dataset; outputs are the coordinates of the parts' centres of mass,
     those of joints, and the rotations of parts.
 

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 def formats() -> str:
     """Return the formats as text for the help."""
-    *first, last = (f"{name} ({each.where})" for name, each in offers("formats").items())
-    return f"{', '.join(first)} or {last}"
+    found = [f"{name} ({each.where})" for name, each in offers("formats").items()]
+    return " or ".join(filter(None, [", ".join(found[:-1]), *found[-1:]])) or "none is installed"
 
 
 def writer_of(name: str) -> Writer:

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...case.io.document import Section, fault, parse, shown
-from ...case.io.reader_options import Supplied
 from ...errors import MOST_NAMED, remedy, shortened
+from .options import WheelOptions
 from .table import Hardpoint, HardpointTable, number, require_name, twice, wanted_corner
 
 _TOKEN = re.compile(
@@ -381,7 +381,7 @@ def is_assetto(text: str) -> bool:
     return re.search(rf"^\s*{_OF_ASSETTO.pattern}\s*=", text, re.MULTILINE) is not None
 
 
-def read_assetto(file: Path, text: str, supplied: Supplied) -> HardpointTable:
+def read_assetto(file: Path, text: str, supplied: WheelOptions) -> HardpointTable:
     """Return the points of an axle of Assetto Corsa (suspensions.ini), of its left wheel unless the
     corner is a right one.
 

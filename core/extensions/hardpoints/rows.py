@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 from ...case.io.document import fault, shown
-from ...case.io.reader_options import NOTHING, Supplied
 from ...case.io.table import (
     DELIMITERS,
     Cell,
@@ -33,6 +32,7 @@ from ...case.io.table import (
 )
 from ...case.units import LENGTHS
 from ...errors import MOST_NAMED, brief, shortened
+from .options import NOTHING, WheelOptions
 from .programs import plain_lines
 from .table import (
     Hardpoint,
@@ -95,7 +95,7 @@ _Parts: TypeAlias = tuple[Head, Sequence[Row], Sequence[Row]]
 """The head of a table, and the rows above and below it."""
 
 
-def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
     """Return the points of a text by name.
 
     Args:
@@ -139,7 +139,7 @@ def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoint
     return read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
 
 
-def read_spreadsheet(file: Path, supplied: Supplied) -> HardpointTable:
+def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:
     """Return the points of a workbook by name.
 
     Args:
@@ -206,7 +206,9 @@ def _join_words(words: Sequence[Cell]) -> Sequence[Cell]:
     return words
 
 
-def read_rows(table: Table, tool: str, facts: dict[str, str], supplied: Supplied) -> HardpointTable:
+def read_rows(
+    table: Table, tool: str, facts: dict[str, str], supplied: WheelOptions
+) -> HardpointTable:
     """Return the points of a table by name.
 
     Args:

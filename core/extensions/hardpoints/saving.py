@@ -12,10 +12,10 @@ from io import StringIO
 from pathlib import Path
 
 from ...case.io.document import number_or_nan, read_text
-from ...case.io.reader_options import Supplied
 from ...case.io.table import DELIMITERS, numeral
-from ...case.models.files import read_hardpoints
 from ...errors import CaseError, KincheckError
+from .options import WheelOptions
+from .reader import read_hardpoints
 from .table import Hardpoint, HardpointTable, axes_of, unit_of
 
 NAME = re.compile(r"[^\W_][\w .+-]{0,80}\.csv")
@@ -29,7 +29,7 @@ def free_name(file: Path) -> str:
 
 
 def save_table(
-    table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]], name: str
+    table: HardpointTable, supplied: WheelOptions, points: Sequence[Sequence[float]], name: str
 ) -> Path:
     """Write a table with other numbers to a new file beside its own.
 
@@ -75,8 +75,8 @@ def _write(path: Path, content: bytes) -> None:
 
 def _reads_back(
     path: Path,
-    said: Supplied,
-    supplied: Supplied,
+    said: WheelOptions,
+    supplied: WheelOptions,
     table: HardpointTable,
     points: Sequence[Sequence[float]],
 ) -> bool:
@@ -166,7 +166,7 @@ def _change(
 
 
 def _new_text(
-    table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]]
+    table: HardpointTable, supplied: WheelOptions, points: Sequence[Sequence[float]]
 ) -> bytes:
     """Return a new table as CSV, with unit, axes, side and template."""
     known = {

@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 from ...case.io.document import fault, parse, parse_yaml, shown, unknown_name
-from ...case.io.reader_options import NOTHING, Supplied
 from ...case.io.table import is_number
 from ...case.units import LENGTHS
 from ...errors import brief, remedy, shortened
 from ...mechanism.mechanism import Vector
+from .options import NOTHING, WheelOptions
 from .programs import without_comments
 from .table import (
     Hardpoint,
@@ -108,7 +108,7 @@ class Leaf:
         return ((*above, split[0]), split[1]) if split else None
 
 
-def read_tree(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+def read_tree(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
     """Return the points of a YAML, JSON or TOML file.
 
     Args:
@@ -124,7 +124,7 @@ def read_tree(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointT
     return _table(file, "YAML", [*_leaves(parse_yaml(file, text))], supplied)
 
 
-def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+def read_python(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
     """Return the points of the assignments of a Python script, dictionaries among them. Nothing is
     evaluated; what is no number, text, list or dictionary of these is left out and listed.
 
@@ -253,7 +253,7 @@ def is_assignments(lines: Sequence[tuple[str, str]]) -> bool:
 
 
 def read_assignments(
-    file: Path, lines: Sequence[tuple[str, str]], facts: dict[str, str], supplied: Supplied
+    file: Path, lines: Sequence[tuple[str, str]], facts: dict[str, str], supplied: WheelOptions
 ) -> HardpointTable:
     """Return the points of assignments.
 
@@ -334,7 +334,11 @@ def _split_name(item: Any) -> tuple[str, Any]:
 
 
 def _table(
-    file: Path, tool: str, tree: Sequence[Leaf], supplied: Supplied, left_out: Sequence[str] = ()
+    file: Path,
+    tool: str,
+    tree: Sequence[Leaf],
+    supplied: WheelOptions,
+    left_out: Sequence[str] = (),
 ) -> HardpointTable:
     """Return the points of a tree."""
     points, others = _points(file, tree)
@@ -426,7 +430,7 @@ def _facts(others: Sequence[Leaf]) -> dict[str, str]:
 
 
 def _of_one_suspension(
-    file: Path, paths: Sequence[Keys], supplied: Supplied
+    file: Path, paths: Sequence[Keys], supplied: WheelOptions
 ) -> tuple[dict[Keys, str], list[str], tuple[str, str] | None]:
     """Return the names of the points of one suspension by their paths, what was left out, and the
     corner that keys name, if it is asked for.

@@ -113,7 +113,7 @@ class Serve(Command):
 
     def _reader(self, registry: Registry) -> Callable[[], Live]:
         """Return the function that opens a table of hardpoints, or any other mechanism."""
-        from ...case.models.files import is_table
+        from ..hardpoints.reader import is_table
         from .model import LiveModel
         from .table import LiveTable
 

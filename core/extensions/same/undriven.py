@@ -9,14 +9,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...case.case import Case
-from ...case.models.files import MODEL, kind_of, load, read_tree, root_of
+from ...case.io.element import Element, printed_digits
+from ...case.models.files import load
 from ...joints import Revolute, Translational
 from ...kinematics import reduce_rows
 from ...mechanism.mechanism import Mechanism
 from ..trees.case import undriven_mechanism
-from ..trees.element import Element, printed_digits
 from ..trees.gluing import glue
 from ..trees.laws import Laws, laws_of, tendons_of
+from ..trees.reader import is_model, read_tree, root_of
 from ..trees.tree import NO_LIMIT, Limit, Strut
 
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
@@ -127,7 +128,7 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
     Raises:
         CaseError: it cannot be read.
     """
-    if kind_of(file) != MODEL:
+    if not is_model(file):
         return undriven_case(load(file), file.name)
     root = root_of(file)
     mechanism, tree, spinning, parts = undriven_mechanism(read_tree(file, without))

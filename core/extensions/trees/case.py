@@ -16,8 +16,9 @@ from ...algebra import Vec3, X, Y, cross, vec
 from ...case.case import Case, Sweep, Truth
 from ...case.closing import within_digits
 from ...case.io.document import SMALLEST, explained, usable
+from ...case.io.element import Names
 from ...case.io.outputs import with_all_motions
-from ...case.io.reader_options import LEFT_OUT, Supplied
+from ...case.io.readers import LEFT_OUT
 from ...errors import WARNING, CaseError, MechanismError, shortened
 from ...joints import (
     Coupler,
@@ -50,8 +51,8 @@ from .driving import (
     read_driving,
     read_start,
 )
-from .element import Names
 from .gluing import glue
+from .options import ModelOptions
 from .place import Place, coordinates, rotation_vector
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, sum_of_masses
 
@@ -67,7 +68,7 @@ PARALLEL = 1e-9
 BEHIND = 100.0
 
 
-def case_of(tree: Tree, supplied: Supplied) -> Case:
+def case_of(tree: Tree, supplied: ModelOptions) -> Case:
     """Return the case of a tree; outputs are the coordinates of the origins of links and of sites,
     those of joints, and the rotations of links.
 
@@ -96,7 +97,7 @@ def undriven_mechanism(
     return whole, model.tree, {spin.move.inner for spin in spins.values()}, parts
 
 
-def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
+def model_of(tree: Tree, supplied: ModelOptions) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
     """Return a tree in its closed start, its driven and held moves, and its links that spin.
 
     Raises:

@@ -15,13 +15,13 @@ import numpy as np
 
 from ...algebra import quat, vec
 from ...case.io.document import decimal, interval, measure, shown, unknown_name, usable
-from ...case.io.reader_options import Supplied
+from ...case.io.element import Element
 from ...case.io.schema import MOST_SAMPLES
 from ...case.units import ANGLES, LENGTHS
 from ...errors import MOST_NAMED, CaseError, remedy, shortened, with_article
 from ...trajectory import Array
 from .assembly import AT_REST, Assembled, Pose, Start, Value
-from .element import Element
+from .options import ModelOptions
 from .place import Place, unit_quaternion
 from .tree import UNKNOWNS, Move, Tree
 
@@ -167,7 +167,7 @@ class Driving:
         return [f"joints beyond their limits: {told}"] if found else []
 
 
-def read_driving(tree: Tree, supplied: Supplied) -> Driving:
+def read_driving(tree: Tree, supplied: ModelOptions) -> Driving:
     """Read --drive and --hold.
 
     Raises:
@@ -254,7 +254,7 @@ def _read_drive(tree: Tree, text: str) -> tuple[str, Array, int | None]:
     return name, np.linspace(start, stop, count), samples
 
 
-def driving_of_motors(tree: Tree, supplied: Supplied) -> tuple[Driving, str]:
+def driving_of_motors(tree: Tree, supplied: ModelOptions) -> tuple[Driving, str]:
     """Return the driving of all joints with a motor through their limits, none without limits, and
     a note on it.
     """

@@ -41,13 +41,13 @@ import msgspec
 
 from ...algebra import Vec3, X, Y, Z, cross, quat, vec
 from ...case.io.document import fault, parse, parse_yaml, read_text, shown, unknown_name, usable
+from ...case.io.element import Element, unit_vector
 from ...errors import WARNING, CaseError, remedy, shortened, similar
 from ...joints.base import triad
 from ...joints.polynomial import HIGHEST
 from ...mechanism.mechanism import Vector
-from .element import Element
 from .graph import Freedom, Graph, Joint
-from .place import ORIGIN, Place, unit_quaternion, unit_vector
+from .place import ORIGIN, Place, unit_quaternion
 from .tree import Closure, Coupling, Kind, Move, Tree, require_spline
 
 CONSTRAINTS = ".constraints.json"

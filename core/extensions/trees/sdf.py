@@ -14,10 +14,10 @@ from functools import partial
 from pathlib import Path
 
 from ...algebra import Vec3, X, Y, Z
-from ...case.io.case_file import LARGEST_FILE
 from ...case.io.document import read_text, shown
+from ...case.io.element import EXTENDED, TAKEN, ZEROS, Apart, Element, file_near, parse_xml, words
+from ...case.io.readers import LARGEST_FILE
 from ...errors import CaseError
-from .element import EXTENDED, TAKEN, ZEROS, Apart, Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
 from .masses import mass_in
 from .place import ORIGIN, Place

@@ -5,7 +5,7 @@ table; read back equal.
 import openpyxl
 import pytest
 from kincheck import KincheckError, Supplied
-from kincheck.core.case.models.files import read_hardpoints
+from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.hardpoints.saving import free_name, save_table
 
 POINTS = {

@@ -7,12 +7,13 @@ import sys
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import LEFT_OUT
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 from kincheck.core.extensions.exports import model_writer
 from kincheck.core.extensions.exports.command import writer_of
 from kincheck.core.extensions.same.undriven import undriven_file
+from kincheck.core.extensions.trees.reader import read_tree
 from scipy.spatial.transform import Rotation
 
 from ...support import case_texts

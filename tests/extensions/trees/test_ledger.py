@@ -13,8 +13,9 @@ import re
 from xml.etree import ElementTree
 
 import pytest
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.trees.reader import read_tree
 
 from ...support import osim_texts
 from ...support.case_texts import write

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import LEFT_OUT
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
 from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
+from kincheck.core.extensions.trees.reader import read_tree
 
 from ...fuzz import sdf as seeds
 from ...support.case_texts import complains, refused, write

@@ -3,8 +3,9 @@
 import re
 
 import pytest
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.trees.reader import read_tree
 
 from ...support.model_files import driven
 from ...support.model_poses import coordinate, solution

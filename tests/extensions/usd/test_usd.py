@@ -6,10 +6,11 @@ from functools import partial
 
 import numpy as np
 import pytest
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
 from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
 from kincheck.core.extensions.trees.driving import read_start
+from kincheck.core.extensions.trees.reader import read_tree
 
 from ...support.model_files import driven
 from ...support.model_poses import EXACT, coordinate, near, solution

@@ -18,14 +18,14 @@ from dataclasses import replace
 from typing import cast
 
 from ...algebra import X, Y, Z, cross, quat, vec
+from ...case.io.element import LEFT, ZEROS, Apart, Element, words
 from ...errors import remedy, shortened, similar
 from ...mechanism.mechanism import Vector
-from .element import LEFT, ZEROS, Apart, Element, words
-from .graph import FramedFreedom, FramedJoint, Graph, global_frames, join
-from .masses import COLLIDER, StageMasses
-from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
-from .robot_elements import mimic
-from .tree import (
+from ..trees.graph import FramedFreedom, FramedJoint, Graph, global_frames, join
+from ..trees.masses import COLLIDER, StageMasses
+from ..trees.place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
+from ..trees.robot_elements import mimic
+from ..trees.tree import (
     INFINITE,
     NO_LIMIT,
     UNKNOWNS,

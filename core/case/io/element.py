@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 import statistics
+import sys
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,10 +19,9 @@ from typing import cast
 from xml.parsers import expat
 
 from ...algebra import Vec3, vec
-from ...case.io.document import decimal, fault, shown, unknown_name, usable
-from ...case.io.ledger import Asked
 from ...errors import CaseError, remedy, similar
-from .place import unit_vector
+from .document import decimal, fault, shown, unknown_name, usable
+from .ledger import Asked
 
 # Elements are some ten deep; but bodies of MJCF are in the bodies that carry them.
 DEEPEST, DEEPEST_BODY = 200, 5_000
@@ -31,6 +31,8 @@ MOST_ELEMENTS = 200_000
 # Two words are alike if a typing error makes one of the other.
 ALIKE = 0.75
 ZEROS = (0.0, 0.0, 0.0)
+# Error of the length of a unit vector by the rounding of its components.
+_ROUND_OFF = 2.0 * sys.float_info.epsilon
 USD = "usd"
 """Tag of the root of a stage of USD, whose numbers are in single precision."""
 EXTENDED = ("robot", "link", "model", "world", "sdf")
@@ -42,6 +44,16 @@ TAKEN, LEFT, TEXT = "taken", "left", "text"
 def words(text: str) -> tuple[str, ...]:
     """Return the words of a text, for tables of names."""
     return tuple(text.split())
+
+
+def unit_vector(numbers: Sequence[float]) -> Vec3:
+    """Return the direction of three numbers, length one; unchanged if they have it to the last
+    digit, so that a file keeps its own numbers. Not for zero.
+    """
+    length = math.hypot(*numbers)
+    if abs(length - 1.0) <= _ROUND_OFF:
+        return vec(numbers)
+    return vec([each / length for each in numbers])
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """OpenSim: models in its XML since version 4; older ones are brought up to date by its own library.
 
-Coordinates keep their names, and the pose is that of their default values. Custom joints turn and
+Coordinates keep their names, and their default values are the pose. Custom joints turn and
 slide by lines of their coordinates; other axes may follow by polynomials and splines. Angles of
 frames and of ball, gimbal and free joints are turns about x, y and z of the body, one after the
 other (OpenSim 4.6).
@@ -20,17 +20,17 @@ from posixpath import normpath
 from numpy.polynomial import Polynomial
 
 from ...algebra import IDENTITY, Quat, Vec3, X, Y, Z
-from ...case.io.case_file import LARGEST_FILE
 from ...case.io.document import fault, read_text, shown
+from ...case.io.element import LEFT, TAKEN, ZEROS, Apart, Element, Names, parse_xml, words
+from ...case.io.readers import LARGEST_FILE
 from ...errors import KincheckError
 from ...extras import library
 from ...joints import PiecewisePolynomial, Spline
 from ...mechanism.loads import Law
-from .element import LEFT, TAKEN, ZEROS, Apart, Element, Names, parse_xml, words
-from .graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
-from .masses import mass_in
-from .place import ORIGIN, Place, turn_about, unit_quaternion
-from .tree import (
+from ..trees.graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
+from ..trees.masses import mass_in
+from ..trees.place import ORIGIN, Place, turn_about, unit_quaternion
+from ..trees.tree import (
     NO_LIMIT,
     BushingLaw,
     Closure,
@@ -291,7 +291,7 @@ class _Reader:
         return link, place * Place(frame.child_vector("translation"), _turn(angles))
 
     def _joint(self, element: Element, coupled: set[str]) -> FramedJoint | None:
-        """Return a joint; None of one that leaves its link free."""
+        """Return a joint; None if it leaves its link free."""
         graph, name = self.graph, element.require("name")
         if element.tag not in (*CHAINS, CUSTOM):
             raise element.unknown_name("type", element.tag, (*CHAINS, CUSTOM), "a joint")
