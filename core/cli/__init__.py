@@ -30,5 +30,6 @@ COMMANDS = {
     "report": "history:ReportChanges",
     "stress": "laboratory:StressEngines",
     "completion": "lists:Completion",
+    "bisect": ".extensions.bisect.command:Bisect",
 }
 """Module and class of each command, in the order of the help."""

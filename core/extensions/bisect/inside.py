@@ -1,0 +1,96 @@
+"""The run inside a release's environment: `python -m ...inside TASK OUT`."""
+
+from __future__ import annotations
+
+import faulthandler
+import inspect
+import pickle
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from ...case.case import Case
+from ...errors import KincheckError, refuse
+from ...harness.record import Outcome, Record, to_json
+
+
+@dataclass(frozen=True)
+class Task:
+    """Cases for one engine.
+
+    Attributes:
+        cases: each as its file has it, and with all its reactions.
+        timeout: of a case, and of the engine's import [s].
+    """
+
+    engine: str
+    mode: str | None
+    cases: Sequence[tuple[Case, Case]]
+    tol: float
+    timeout: float
+
+
+class Done(msgspec.Struct, frozen=True):
+    """The records, the file of the engine's class, and why there are none."""
+
+    records: list[Record] = []
+    file: str = ""
+    problem: str = ""
+
+
+def solved(task: Task) -> Done:
+    """Return what the engine makes of the cases.
+
+    Raises:
+        KincheckError: there is no such engine.
+    """
+    from ...cli.main import registry
+    from ...harness.resource_limits import Limits
+    from ...harness.run import run
+    from ...harness.workers.pool import in_workers
+
+    problems: list[str] = []
+    known = registry()
+    # an import that never ends stops here
+    faulthandler.dump_traceback_later(task.timeout, exit=True)
+    engines = known.find_engines([task.engine], problems, task.mode)
+    faulthandler.cancel_dump_traceback_later()
+    refuse(problems)
+    solver = in_workers(1, Limits(timeout=task.timeout))
+
+    def records(cases: Sequence[Case]) -> dict[str, Record]:
+        baseline = known.baseline(engines)
+        found = run(cases, engines, tol=task.tol, baseline=baseline, solver=solver)
+        return {each.case: each for each in found.records}
+
+    found = records([whole for _, whole in task.cases])
+    # an engine without these reactions keeps its curves
+    less = [
+        plain
+        for plain, whole in task.cases
+        if whole is not plain and found[plain.name].outcome is Outcome.UNSUPPORTED
+    ]
+    return Done([*(found | (records(less) if less else {})).values()], _file(engines[0]))
+
+
+def _file(engine: object) -> str:
+    try:
+        return inspect.getfile(type(engine))
+    except TypeError:
+        return ""
+
+
+def main(task: str, out: str) -> None:
+    """Write what the engine makes of the cases of a task."""
+    try:
+        done = solved(pickle.loads(Path(task).read_bytes()))
+    except KincheckError as error:
+        done = Done(problem=str(error))
+    Path(out).write_bytes(to_json(done))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

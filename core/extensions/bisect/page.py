@@ -1,0 +1,110 @@
+"""The page of a search over releases."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ...errors import number_of
+from ...harness.labels import number
+from ...report.sections import Report, Section
+from ...unit_text import value_text
+from .results import UNKNOWN, Bisection, CaseChange, Change
+from .signature import Signature
+
+CHANGES = ("change", "kind", "case", "curve", "before", "after", "tolerance", "right", "field")
+
+
+def report(found: Bisection, states: Mapping[str, Signature | None]) -> Report:
+    """Return tables of the changes and of the releases that were run."""
+    tables = [each for change in found.changes for each in _rows(change)]
+    links = [
+        f"{change.reproducer}/README.md" if change.reproducer else ""
+        for change in found.changes
+        for _ in change.cases
+    ]
+    first, last = found.ends
+    none = f"No change between {first} and {last}." if len(found.tried) > 1 else ""
+    if not found.every and none:
+        none += " Changes that were undone between the ends are found with --every."
+    return Report(
+        "bisect",
+        f"{found.engine}: {number_of(len(found.changes), 'change')} from {found.package}"
+        f" {first} to {last}",
+        [
+            f"kincheck {found.kincheck}",
+            f"{len(found.tried)} of {found.releases} releases run",
+            found.command,
+        ],
+        [
+            Section(
+                "Changes",
+                [*map(says, found.changes)] or [none] * bool(none),
+                ["Before and after: the largest error of the curve against the truth of its case."]
+                * bool(tables),
+                CHANGES,
+                4,
+                tables,
+                links=links,
+            ),
+            Section(
+                "Releases",
+                [],
+                [],
+                ("release", "cases"),
+                2,
+                [(name, _summary(states.get(name), found.reasons.get(name, ""))) for name in _run(found)],
+            ),
+        ],
+    )
+
+
+def _run(found: Bisection) -> list[str]:
+    return [*found.tried, *found.not_installable]
+
+
+def _summary(state: Signature | None, reason: str) -> str:
+    if state is None:
+        return f"cannot be installed: {reason}"
+    outcomes = [each.outcome for each in state.values()]
+    return ", ".join(f"{outcomes.count(each)} {each}" for each in dict.fromkeys(outcomes))
+
+
+def _rows(change: Change) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
+    for case, each in change.cases.items():
+        curve, errors, tolerance = "", each.outcomes, ""
+        if each.curves:
+            worst = each.curves[0]
+            curve = worst.output
+            errors = tuple(value_text(number(error), worst.unit) for error in worst.errors)
+            tolerance = value_text(number(worst.tolerance), worst.unit)
+        name = f"{change.earlier} → {change.later}"
+        rows.append(
+            (name, each.kind, case, curve, *errors, tolerance, each.right, change.field or "")
+        )
+    return rows
+
+
+def says(change: Change) -> str:
+    """Return a change in a sentence or two."""
+    cases = [*change.cases.values()]
+    name = f"{change.earlier} → {change.later}"
+    if change.kind == "interface":
+        messages = next(each.messages for each in cases)
+        return (
+            f"{name}: interface changed, {number_of(len(cases), 'case')}: "
+            f"{messages[0] or 'runs'} → {messages[1] or 'runs'}"
+        )
+    curves = sum(len(each.curves) for each in cases)
+    text = f"{name}: result changed, {number_of(curves, 'curve')} of "
+    text += f"{number_of(len(cases), 'case')}. {_verdict(change, cases)}"
+    return text + (f" The first field that differs is {change.field}." if change.field else "")
+
+
+def _verdict(change: Change, cases: list[CaseChange]) -> str:
+    if change.right == UNKNOWN:
+        return "No truth of the cases says who is right."
+    against = {curve.against.replace("_", " ") for each in cases for curve in each.curves}
+    by = f" by {' and '.join(sorted(against))}" if against else ""
+    right = change.right if change.right in (change.earlier, change.later) else "Neither"
+    return f"{right} is right{by}."
