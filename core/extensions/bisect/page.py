@@ -9,7 +9,7 @@ from ...harness.labels import number
 from ...report.sections import Report, Section
 from ...unit_text import value_text
 from .results import UNKNOWN, Bisection, CaseChange, Change
-from .signature import Signature
+from .signature import TRUTHS, Signature
 
 CHANGES = ("change", "kind", "case", "curve", "before", "after", "tolerance", "right", "field")
 
@@ -104,7 +104,12 @@ def says(change: Change) -> str:
 def _verdict(change: Change, cases: list[CaseChange]) -> str:
     if change.right == UNKNOWN:
         return "No truth of the cases says who is right."
-    against = {curve.against.replace("_", " ") for each in cases for curve in each.curves}
+    against = {
+        curve.against.replace("_", " ")
+        for each in cases
+        for curve in each.curves
+        if curve.against in TRUTHS
+    }
     by = f" by {' and '.join(sorted(against))}" if against else ""
     right = change.right if change.right in (change.earlier, change.later) else "Neither"
     return f"{right} is right{by}."

@@ -62,7 +62,8 @@ class States:
             tell(f"{name}: cannot be installed: {error}")
             return None
         kept = self._kept(release)
-        if kept.is_file():
+        before = kept.is_file()
+        if before:
             done = msgspec.json.decode(kept.read_bytes(), type=Done)
         else:
             done = self._run(python)
@@ -76,7 +77,7 @@ class States:
             lost = Answer("error", done.problem, runs=False)
             found = {plain.name: lost for plain, _ in self.task.cases}
         found |= self._reader(python)
-        tell(f"{name}: {_counts(found)}{self._left(kept.is_file() and not self.seconds)}")
+        tell(f"{name}: {_counts(found)}{', kept from before' if before else self._left()}")
         return found
 
     def _run(self, python: str) -> Done:
@@ -122,14 +123,14 @@ class States:
         ours = any(Path(done.file).is_relative_to(home) for home in homes)
         return ours and all(each.outcome.value != "timeout" for each in done.records)
 
-    def _left(self, kept: bool) -> str:
-        if kept or not self.seconds:
-            return ", kept from before"
-        tried = [each for each in self.found.values() if each]
-        most = max(0, 2 + math.ceil(math.log2(len(self.releases))) - len(tried) - 1)
+    def _left(self) -> str:
+        done = len(self.found) + 1
+        wanted = min(len(self.releases), 2 + math.ceil(math.log2(len(self.releases))))
+        most = max(0, wanted - done)
         left = most * sum(self.seconds) / len(self.seconds)
         more = number_of(most, "more release")
-        return f" in {self.seconds[-1]:.0f} s; {more} for one change, {left:.0f} s" if most else ""
+        told = f" in {self.seconds[-1]:.0f} s"
+        return f"{told}; {more} for one change, about {left:.0f} s" if most else told
 
 
 def probe_of(engine: str) -> Path | None:
