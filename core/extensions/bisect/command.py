@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,10 +10,12 @@ from typing import TYPE_CHECKING
 from ...cli.parser import Command
 from ...cli.registry import Registry, Status
 from ...errors import KincheckError, refuse
+from ...harness.engine import STANDARD
 from ...options import CASES, argument, destination, json_file, option, options, positive, switch
 
 if TYPE_CHECKING:
     from ...case.case import Case
+    from ...harness.record import Record
 
 TOL = 1e-12
 TIMEOUT = 60.0
@@ -89,7 +92,8 @@ class Bisect(Command):
         known = [*self.releases, *ends] if self.releases else releases.releases_of(package)
         row = releases.between(known, *ends)
         pairs = [(case, _with_reactions(case)) for case in cases]
-        task = Task(self.engine, self.mode, pairs, TOL, self.timeout)
+        native = [_native(registry, each) for each in zip(*pairs, strict=True)]
+        task = Task(self.engine, self.mode, pairs, (native[0], native[1]), TOL, self.timeout)
         states = States(row, task, releases.Environments(package, 1e9 * self.disk))
         found: list[Change] = []
         try:
@@ -149,6 +153,12 @@ class Bisect(Command):
             problems=problems,
         )
         return Status.DEVIATES if found else Status.WITHIN
+
+
+def _native(registry: Registry, cases: Sequence[Case]) -> Sequence[Record]:
+    from ...harness.run import run
+
+    return run(cases, [registry.engine(STANDARD)], tol=TOL).records
 
 
 def _with_reactions(case: Case) -> Case:

@@ -14,6 +14,7 @@ import msgspec
 
 from ...case.case import Case
 from ...errors import KincheckError, refuse
+from ...harness.engine import STANDARD
 from ...harness.record import Outcome, Record, to_json
 
 
@@ -23,12 +24,14 @@ class Task:
 
     Attributes:
         cases: each as its file has it, and with all its reactions.
+        native: the native engine's records of both, the standard where a case has no truth.
         timeout: of a case, and of the engine's import [s].
     """
 
     engine: str
     mode: str | None
     cases: Sequence[tuple[Case, Case]]
+    native: tuple[Sequence[Record], Sequence[Record]]
     tol: float
     timeout: float
 
@@ -61,19 +64,24 @@ def solved(task: Task) -> Done:
     refuse(problems)
     solver = in_workers(1, Limits(timeout=task.timeout))
 
-    def records(cases: Sequence[Case]) -> dict[str, Record]:
-        baseline = known.baseline(engines)
-        found = run(cases, engines, tol=task.tol, baseline=baseline, solver=solver)
-        return {each.case: each for each in found.records}
+    standard = known.engine(STANDARD)
 
-    found = records([whole for _, whole in task.cases])
+    def records(cases: Sequence[Case], native: Sequence[Record]) -> dict[str, Record]:
+        names = {each.name for each in cases}
+        made = [each for each in native if each.case in names]
+        found = run(cases, [standard, *engines], tol=task.tol, made=made, solver=solver)
+        return {each.case: each for each in found.records if each.engine != STANDARD}
+
+    found = records([whole for _, whole in task.cases], task.native[1])
     # an engine without these reactions keeps its curves
     less = [
         plain
         for plain, whole in task.cases
         if whole is not plain and found[plain.name].outcome is Outcome.UNSUPPORTED
     ]
-    return Done([*(found | (records(less) if less else {})).values()], _file(engines[0]))
+    if less:
+        found |= records(less, task.native[0])
+    return Done([*found.values()], _file(engines[0]))
 
 
 def _file(engine: object) -> str:

@@ -177,8 +177,9 @@ class Environments:
                 python = _python(made)
                 wanted = f"{self.package}=={release}"
                 _install(str(python), "--no-deps", "--ignore-installed", wanted)
-                _see_this_python(python)
-                _install(str(python), wanted)
+                packages = _see_this_python(python)
+                if any(_needs(each) for each in packages.glob("*.dist-info/METADATA")):
+                    _install(str(python), wanted)
                 shutil.rmtree(path, ignore_errors=True)
                 made.rename(path)
                 (path / USED).touch()
@@ -220,8 +221,14 @@ def _python(path: Path) -> Path:
     return path / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
-def _see_this_python(python: Path) -> None:
-    """Let an environment see the packages of this Python behind its own."""
+def _needs(metadata: Path) -> bool:
+    """Return whether a package requires others, without extras."""
+    lines = re.findall(r"^Requires-Dist:.*$", metadata.read_text("utf-8", "replace"), re.M)
+    return any("extra ==" not in each for each in lines)
+
+
+def _see_this_python(python: Path) -> Path:
+    """Let an environment see the packages of this Python behind its own; return their folder."""
     import site
 
     status, own = run([str(python), "-c", "import site; print(site.getsitepackages()[0])"], 60.0)
@@ -230,7 +237,9 @@ def _see_this_python(python: Path) -> None:
     folders = [*site.getsitepackages(), *([site.getusersitepackages()] * bool(site.ENABLE_USER_SITE))]
     lines = [f"import site; site.addsitedir({each!r})\n" for each in folders]
     # read last, behind the files of the release
-    Path(own.strip().splitlines()[-1], "zzz_kincheck.pth").write_text("".join(lines), "utf-8")
+    packages = Path(own.strip().splitlines()[-1])
+    (packages / "zzz_kincheck.pth").write_text("".join(lines), "utf-8")
+    return packages
 
 
 def _install(python: str, *wanted: str) -> None:

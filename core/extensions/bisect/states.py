@@ -112,7 +112,7 @@ class States:
             for each in Path(str(files(package))).rglob("*.py")
         )
         environment = self.environments.path_of(release)
-        key = digest(VERSION, replace(self.task, timeout=0.0), environment.name, sources)
+        key = digest(VERSION, replace(self.task, native=((), ()), timeout=0.0), environment.name, sources)
         return environment / f".{key[:32]}.json"
 
     def _lasting(self, done: Done, release: str) -> bool:
