@@ -38,14 +38,11 @@ if TYPE_CHECKING:
     )
     from .kinematics import (
         Assembled,
-        Assemblies,
-        Assembly,
         Curve,
         Designs,
         Event,
         Residuals,
         assemble,
-        find_assemblies,
         residuals,
         solve,
         solve_designs,
@@ -61,8 +58,6 @@ __version__ = VERSION
 __all__ = [
     "GROUND",
     "Assembled",
-    "Assemblies",
-    "Assembly",
     "Body",
     "BodyMotion",
     "Case",
@@ -116,7 +111,6 @@ __all__ = [
     "assemble",
     "check_joint",
     "clear_caches",
-    "find_assemblies",
     "residuals",
     "solve",
     "solve_designs",
@@ -137,8 +131,7 @@ _NAMES = {
     "case.case": "Case",
     "case.io.reader_options": "Supplied",
     "kinematics": (
-        "Assembled Assemblies Assembly Curve Designs Event Residuals "
-        "assemble find_assemblies residuals solve solve_designs trace"
+        "Assembled Curve Designs Event Residuals assemble residuals solve solve_designs trace"
     ),
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",

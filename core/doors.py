@@ -26,7 +26,6 @@ GROUP = "kincheck.extensions"
 """Entry points of extensions in other packages: NAME = "module:EXTENSION"."""
 
 _Table = Mapping[str, str]
-_NOTHING: Any = field(default_factory=dict[str, str])
 
 
 @dataclass(frozen=True)
@@ -40,27 +39,29 @@ class Extension:
         commands: class of each command of the command line; see `cli.parser.Command`.
         public: object of each name in the package kincheck.
         schemas: type, or function that returns the JSON Schema, of each kind of file.
-        keys: functions that yield lines on the keys of a file, for `kincheck list --schema`.
-        completions: function that returns the values of each option that a shell completes.
+        keys: docstring whose part behind "Reference. " lists the keys of a kind of file.
+        completions: names that a shell offers as values of each option.
         engines: class of each engine in projection mode.
         simulations: function without arguments that returns each engine in simulate mode.
         writers: function that writes a mechanism in each format; see `case.io.model_writer`.
         formats: who reads each format, for the help.
         converters: function from a model's file to the text that a simulator saves.
+        steppers: script of each stepper of free motion; see `adapters.steppers.scripts`.
     """
 
     package: str
     needs: Sequence[str] = ()
-    commands: _Table = _NOTHING
-    public: _Table = _NOTHING
-    schemas: _Table = _NOTHING
-    keys: _Table = _NOTHING
-    completions: _Table = _NOTHING
-    engines: _Table = _NOTHING
-    simulations: _Table = _NOTHING
-    writers: _Table = _NOTHING
-    formats: _Table = _NOTHING
-    converters: _Table = _NOTHING
+    commands: _Table = field(default_factory=dict[str, str])
+    public: _Table = field(default_factory=dict[str, str])
+    schemas: _Table = field(default_factory=dict[str, str])
+    keys: _Table = field(default_factory=dict[str, str])
+    completions: _Table = field(default_factory=dict[str, str])
+    engines: _Table = field(default_factory=dict[str, str])
+    simulations: _Table = field(default_factory=dict[str, str])
+    writers: _Table = field(default_factory=dict[str, str])
+    formats: _Table = field(default_factory=dict[str, str])
+    converters: _Table = field(default_factory=dict[str, str])
+    steppers: _Table = field(default_factory=dict[str, str])
 
     @property
     def name(self) -> str:
@@ -107,7 +108,7 @@ def extensions() -> Mapping[str, Extension]:
     return found
 
 
-def offers(kind: str) -> Mapping[str, Offer]:
+def offers(kind: str) -> dict[str, Offer]:
     """Return what all extensions offer of a kind, a field of `Extension`, by name.
 
     Raises:

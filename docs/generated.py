@@ -16,7 +16,7 @@ import kincheck
 from kincheck.core.case.io import schema
 from kincheck.core.case.io.catalogue import output_tables, type_tables
 from kincheck.core.cli.main import parser as parser_of
-from kincheck.core.studies.variation import variation_schema
+from kincheck.core.extensions.sweep import variation_schema
 
 ROOT = Path(__file__).parent.parent
 SHARED = {

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from kincheck import residuals
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.adams.dataset import read_dataset
-from kincheck.core.case.models.adams.model import read_markers, read_places, read_units
 from kincheck.core.case.models.files import load
+from kincheck.core.extensions.adams.dataset import read_dataset
+from kincheck.core.extensions.adams.model import read_markers, read_places, read_units
 from kincheck.core.kinematics import needed_forces
 from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation

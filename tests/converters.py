@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from kincheck import adapters
-from kincheck.core.case.models.undriven import undriven_file
+from kincheck.core.doors import offers
 from kincheck.core.errors import KincheckError
-from kincheck.core.studies.same import compare
+from kincheck.core.extensions.same.undriven import undriven_file
+from kincheck.core.extensions.same.verdict import compare
 
 CONVERTERS = ("mujoco",)
 
@@ -35,7 +35,7 @@ def converted(file: Path, name: str) -> str:
     """Return the verdict on a file and what a simulator saves of it."""
     with TemporaryDirectory() as folder:
         out = Path(folder) / "converted.xml"
-        out.write_text(adapters.converter(name)(file), encoding="utf-8")
+        out.write_text(offers("converters")[name].load()(file), encoding="utf-8")
         return compare(undriven_file(file), undriven_file(out), {}).text
 
 

@@ -13,8 +13,8 @@ import kincheck.adapters
 import kincheck.core
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main, parser
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.primitives import Dot10
 
 from .support.case_texts import rows
@@ -23,7 +23,7 @@ from .support.sources import ROOT, tree
 ONLY_NAMES = """
 import sys
 import kincheck
-assert kincheck.__version__ and "Mechanism" in dir(kincheck)
+assert kincheck.__version__ and "Mechanism" in kincheck.core.__all__
 print(*sorted({name.split(".")[0] for name in sys.modules} & {"numpy", "scipy", "msgspec", "rich"}))
 print(*sorted(name for name in sys.modules if name.startswith("kincheck")))
 kincheck.Revolute
@@ -41,7 +41,7 @@ def test_import_loads_names_only():
 
 BY_NAME = (
     *("check_engine", "compare", "compliance", "explain", "free", "live", "load"),
-    *("primitives", "report", "run", "sweep"),
+    *("primitives", "report", "run", "sweep", "Assemblies", "Assembly", "find_assemblies"),
 )
 VARY = """schema = "kincheck-vary/1"
 mode = "monte_carlo"

@@ -8,8 +8,8 @@ import sys
 import kincheck
 import numpy as np
 import pytest
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.dataset import Dataset, Variable
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.harness.scene_record import Scene, SceneBody, SceneJoint, ScenePoint
 from kincheck.core.tabular import Tabular
 

@@ -8,6 +8,8 @@ from .support.sources import SOURCES, statements, tree
 
 MOST = 12.0
 """In 1,000 words of docstrings; asv, QCEngine, Optimistix and scikit-fem have 4 to 10."""
+FEW = 1000
+"""Words of a folder whose share says something."""
 HEAVY = re.compile(r"\b(what|that|where)\b", re.IGNORECASE)
 WORD = re.compile(r"[A-Za-z]+")
 
@@ -23,7 +25,9 @@ def shares():
             for folder in {*map(str, path.parents), f"{path.parent}/*.py"} if text else ():
                 words[folder] += len(WORD.findall(text))
                 heavy[folder] += len(HEAVY.findall(text))
-    return {folder: 1000.0 * heavy[folder] / words[folder] for folder in words}
+    return {
+        folder: 1000.0 * heavy[folder] / count for folder, count in words.items() if count > FEW
+    }
 
 
 def test_heavy_words_are_counted():

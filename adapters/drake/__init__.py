@@ -1,3 +1,9 @@
 """Drake: projection mode with the kinematics and Jacobians of its MultibodyPlant, and simulate
 mode.
 """
+
+from ...core.doors import Extension
+
+EXTENSION = Extension(
+    __name__, engines={"drake": "drake:Drake"}, simulations={"drake": "drake:Steps"}
+)

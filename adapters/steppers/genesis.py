@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..shared.stepper_loop import rotation
+from .stepper_loop import rotation
 
 
 def version() -> str:

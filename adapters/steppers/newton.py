@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..shared.stepper_loop import loads, require, rotation
+from .stepper_loop import loads, require, rotation
 
 
 def version() -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..shared.stepper_loop import loads, require, state_of
+from .stepper_loop import loads, require, state_of
 
 
 def version() -> str:

@@ -4,7 +4,7 @@ from importlib import import_module
 from importlib.metadata import version as version_of
 from typing import Any
 
-from ..shared.stepper_mjcf import body_states, loaded
+from .stepper_mjcf import body_states, loaded
 
 
 def version() -> str:

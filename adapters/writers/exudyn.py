@@ -20,8 +20,8 @@ import numpy as np
 
 from ...core import joints as j
 from ...core.algebra import triple, vec
-from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
 from ...core.errors import KincheckError
+from ...core.extensions.exports.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import (

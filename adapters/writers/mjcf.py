@@ -16,9 +16,9 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
 from ...core.algebra import vec
-from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
-from ...core.case.models.trees.masses import STAND_INS
 from ...core.errors import KincheckError
+from ...core.extensions.exports.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
+from ...core.extensions.trees.masses import STAND_INS
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import BodyMotion

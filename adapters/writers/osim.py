@@ -19,7 +19,7 @@ import numpy as np
 from numpy.polynomial import Polynomial as Powers
 
 from ...core.algebra import IDENTITY, Quat, triple, vec
-from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
+from ...core.extensions.exports.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
 from ...core.joints import PiecewisePolynomial
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body

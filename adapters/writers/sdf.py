@@ -16,9 +16,9 @@ from math import inf
 import numpy as np
 
 from ...core.algebra import IDENTITY, Quat, triple
-from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
-from ...core.case.models.trees.robot_elements import BUSHING, STRUT
 from ...core.errors import KincheckError
+from ...core.extensions.exports.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
+from ...core.extensions.trees.robot_elements import BUSHING, STRUT
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper

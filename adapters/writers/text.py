@@ -10,10 +10,10 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from ...core.case.io.model_writer import Ranges, Zeros
-from ...core.case.models.trees.robot_elements import BUSHING_LAW, STRUT, STRUT_LAW
-from ...core.case.models.trees.tree import BETWEEN, STAND_IN
 from ...core.errors import KincheckError
+from ...core.extensions.exports.model_writer import Ranges, Zeros
+from ...core.extensions.trees.robot_elements import BUSHING_LAW, STRUT, STRUT_LAW
+from ...core.extensions.trees.tree import BETWEEN, STAND_IN
 from ...core.joints import Distance
 from ...core.mechanism.body import Body, inertia_matrix
 from ...core.mechanism.loads import Bushing, ForceElement, Law, SpringDamper

@@ -22,8 +22,8 @@ from typing import Any, cast
 import numpy as np
 
 from ...core.algebra import vec
-from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
-from ...core.case.models.trees.robot_elements import BUSHING, STRUT
+from ...core.extensions.exports.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
+from ...core.extensions.trees.robot_elements import BUSHING, STRUT
 from ...core.joints import Joint
 from ...core.mechanism.loads import ForceElement, SpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector

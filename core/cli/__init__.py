@@ -1,35 +1,29 @@
 """The command line. A command is a data class whose fields are its options, with `answer`, which is
 the function in Python, and `run`, which prints, writes and returns the exit status.
 
-A new command is such a class and its name in `COMMANDS`. Slow imports wait until it runs.
+A command of the kernel is such a class and its name here; a command of an extension stands in its
+`EXTENSION`. Slow imports wait until it runs.
 """
+
+from collections.abc import Mapping
+
+from ..doors import Extension, Offer, offers
 
 COMMANDS = {
     "run": "run:Run",
-    "sweep": "sweep:Sweep",
     "list": "lists:List",
-    "templates": "files:PrintTemplates",
-    "schema": "lists:PrintSchema",
-    "bench": "laboratory:BenchAll",
+    "import": "importing:Import",
     "check-joint": "checks:CheckJoint",
     "check-engine": "checks:CheckEngine",
-    "import": "files:Import",
-    "export": "files:Export",
-    "reference": "checks:ProveReferences",
-    "explain": "examine:Explain",
-    "assemblies": "examine:ListAssemblies",
-    "same": "files:Same",
-    "compare": "compare:Compare",
-    "trace": "examine:Trace",
-    "kc": "kc:MeasureCompliance",
-    "serve": "serve:Serve",
-    "free": "examine:MoveFreely",
-    "board": "board:CompareSteppers",
-    "doctor": "doctor:Doctor",
     "history": "history:ListRuns",
     "report": "history:ReportChanges",
-    "stress": "laboratory:StressEngines",
+    "schema": "lists:PrintSchema",
     "completion": "lists:Completion",
-    "bisect": ".extensions.bisect.command:Bisect",
 }
-"""Module and class of each command, in the order of the help."""
+"""Module and class of each command of the kernel, in the order of the help."""
+
+
+def every_command() -> Mapping[str, Offer]:
+    """Return all commands by name: those of the kernel, then those of extensions."""
+    own = Extension(__name__)
+    return {name: Offer(own, where) for name, where in COMMANDS.items()} | offers("commands")

@@ -8,17 +8,15 @@ import importlib
 import re
 import sys
 import traceback
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from ..doors import entry_points
 from ..errors import KincheckError, similar
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
-
     from ..harness.engine import Engine
 
 
@@ -158,14 +156,6 @@ def _is_engine(each: object) -> bool:
     return isinstance(each, type) and all(hasattr(each, name) for name in MEMBERS[4:])
 
 
-@cache
-def entry_points() -> Mapping[str, EntryPoint]:
-    """Return the engines of other installed packages, by name."""
-    from importlib import metadata  # slow
-
-    return {each.name: each for each in metadata.entry_points(group=GROUP)}
-
-
 def names_of_entry_points(known: Sequence[str]) -> tuple[str, ...]:
     """Return the names of other packages' engines.
 
@@ -175,10 +165,10 @@ def names_of_entry_points(known: Sequence[str]) -> tuple[str, ...]:
     Raises:
         KincheckError: another package's engine has one of these names.
     """
-    for name, each in entry_points().items():
+    for name, each in entry_points(GROUP).items():
         if name in known:
             raise KincheckError(
                 f"package {each.dist.name if each.dist else each.value!r} offers an engine named"
                 f" {name!r}, which is kincheck's own. Rename its entry point."
             )
-    return tuple(entry_points())
+    return tuple(entry_points(GROUP))

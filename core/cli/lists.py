@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from ..case.io.atomic_files import to_standard_output
+from ..doors import Extension, Offer, offers
 from ..extras import how_to_install, installed_version, is_extra
 from ..options import argument, joint_types, options, switch, verbosity
 from .parser import Command
@@ -126,10 +126,9 @@ def _print_references(options: List, console: Console) -> None:
 def _keys() -> Iterator[str]:
     """Yield the lines on the keys of case and variation files, from their readers."""
     from ..case.io import schema
-    from ..studies.variation import variation_schema
 
-    for module in (schema, variation_schema):
-        what, _, keys = (module.__doc__ or "").partition("Reference. ")
+    for text in (schema.__doc__ or "", *(each.load() for each in offers("keys").values())):
+        what, _, keys = text.partition("Reference. ")
         yield from (what.splitlines()[0], "", *keys.splitlines(), "")
 
 
@@ -159,19 +158,21 @@ def _start(line: str) -> int:
 
 SCHEMAS = {
     "case": "case.io.catalogue:case_schema",
-    "variation": "studies.variation.variation_schema:variation_schema",
     "results": "harness.record:Results",
     "regression": "history.findings:Regressions",
-    "live": "live.protocol:live_schema",
-    "board": "studies.board.results:Board",
 }
-"""The type of each file, or the function that returns its schema, as modules of core."""
+"""The type of each file of the kernel, or the function that returns its schema, in core."""
+
+
+def every_schema() -> Mapping[str, Offer]:
+    """Return the types and functions of all kinds of files by name; those of extensions last."""
+    core = Extension(__name__.rpartition(".cli.")[0])
+    return {name: Offer(core, where) for name, where in SCHEMAS.items()} | offers("schemas")
 
 
 def schema_of(name: str) -> dict[str, Any]:
-    """Return the JSON Schema of a file of `SCHEMAS`."""
-    module, _, attribute = SCHEMAS[name].partition(":")
-    found = getattr(import_module(f"...{module}", __name__), attribute)
+    """Return the JSON Schema of a kind of file."""
+    found = every_schema()[name].load()
     return msgspec.json.schema(found) if isinstance(found, type) else found()
 
 
@@ -183,9 +184,9 @@ class PrintSchema(Command):
 
     about = "print the JSON Schema of a file"
     name: str = argument(
-        f"one of {', '.join(SCHEMAS)}; TOML files follow the schema of their content",
+        f"one of {', '.join(every_schema())}; TOML files follow the schema of their content",
         "NAME",
-        choices=[*SCHEMAS],
+        choices=[*every_schema()],
     )
     joint_type: tuple[str, ...] = joint_types()
 
@@ -226,18 +227,15 @@ class Completion(Command):
         """Do the work of the command line."""
         import shtab
 
-        from ..case.models.hardpoints.templates import TEMPLATES
         from ..joints import Joint
-        from ..studies.stress.families import FAMILIES
         from .main import parser
 
         names = {
             **dict.fromkeys(ENGINES, registry.every_engine),
-            "family": [*FAMILIES],
-            "template": [*TEMPLATES],
-            "to": [*registry.writers],
+            "to": [*offers("writers")],
+            "export": [*offers("writers")],
             "joint": sorted(Joint.registry),
-            "export": [*registry.writers],
+            **{name: [*each.load()] for name, each in offers("completions").items()},
         }
         found = parser([])
         for each in (found, *_below(found)):

@@ -6,20 +6,21 @@ from __future__ import annotations
 
 import argparse
 import errno
-import importlib
 import os
 import shlex
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from io import TextIOWrapper
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TextIO, TypeVar
 
+from ..doors import entry_points
 from ..errors import KincheckError
 from ..extras import THREADS
 from ..harness.interrupts import Terminated, listening, status_of, words_of
+from ..options import function_of
 from ..version import VERSION
-from . import COMMANDS
+from . import every_command
 from .parser import Parser, add_command
 
 if TYPE_CHECKING:
@@ -125,17 +126,17 @@ def _print_no_more() -> None:
 
 
 def registry() -> Registry:
-    """Return the registry of engines, cases and writers."""
+    """Return the registry of engines and cases."""
     from ... import adapters, cases
     from . import class_loading
     from .registry import Registry
 
     others = class_loading.names_of_entry_points((*adapters.ENGINES, *adapters.SIMULATIONS))
-    writers = adapters.WRITERS, adapters.writer
 
     def engine(name: str, mode: str = "projection") -> Any:
         if name in others:
-            return class_loading.create_engine(name, class_loading.entry_points()[name].load())
+            point = entry_points(class_loading.GROUP)[name]
+            return class_loading.create_engine(name, point.load())
         return adapters.engine(name) if mode == "projection" else adapters.engine(name, mode)
 
     return Registry(
@@ -143,14 +144,26 @@ def registry() -> Registry:
         engine,
         cases.names,
         cases.load,
-        *writers,
         cases.summary,
         tuple(adapters.SIMULATIONS),
-        tuple(adapters.CONVERTERS),
-        adapters.converter,
-        adapters.APART,
-        adapters.stepper_files,
     )
+
+
+_Options = ParamSpec("_Options")
+_Answer = TypeVar("_Answer")
+_Answer_co = TypeVar("_Answer_co", covariant=True)
+
+
+class _Command(Protocol[_Answer_co]):
+    def answer(self, registry: Registry) -> _Answer_co: ...
+
+
+def function(
+    name: str, command: Callable[_Options, _Command[_Answer]]
+) -> Callable[_Options, _Answer]:
+    """Return the function of a command: its arguments are the options."""
+    found: Any = function_of(name, command, lambda options: options.answer(registry()))
+    return found
 
 
 def parser(argv: Sequence[str]) -> Parser:
@@ -163,9 +176,8 @@ def parser(argv: Sequence[str]) -> Parser:
     )
     found.add_argument("--version", action="version", version=f"kincheck {VERSION}")
     commands = found.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    named = [name for name in COMMANDS if argv and argv[0] == name]
-    for name in named or COMMANDS:
-        module, _, cls = COMMANDS[name].partition(":")
-        command = getattr(importlib.import_module(f".{module}", __package__), cls)
-        add_command(commands, name, command)
+    known = every_command()
+    named = [name for name in known if argv and argv[0] == name]
+    for name in named or known:
+        add_command(commands, name, known[name].load())
     return found

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from fnmatch import fnmatchcase
 from glob import glob
@@ -18,7 +18,6 @@ from .class_loading import WHERE, create_engine, load_engine
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..case.io.model_writer import Writer
     from ..harness.engine import Engine
     from ..harness.record import Results
 
@@ -49,30 +48,17 @@ class Registry:
         engine: returns the engine of a name, and of a mode if it is not projection.
         cases: returns the names of the built-in cases.
         case: returns the built-in case of a name, with its reference.
-        writers: names of the export formats.
-        writer: returns the writer of a format.
         summary: returns kind of reference and source of a built-in case by its name, without
             loading it.
         simulations: names of the engines in simulate mode.
-        converters: names of the simulators that save models.
-        converter: returns the function of such a name, from a file to the text of another.
-        apart: requirements of the steppers that have environments of their own.
-        stepper_files: returns the files of a stepper's reproducer, of an engine, a mechanism and
-            its twists at the start.
     """
 
     engines: Sequence[str]
     engine: Callable[..., Any]
     cases: Callable[[], Sequence[str]]
     case: Callable[[str], Case]
-    writers: Sequence[str]
-    writer: Callable[[str], Writer]
     summary: Callable[[str], tuple[str, str]]
     simulations: Sequence[str] = ()
-    converters: Sequence[str] = ()
-    converter: Callable[[str], Callable[[Path], str]] | None = None
-    apart: Mapping[str, str] = field(default_factory=dict[str, str])
-    stepper_files: Callable[..., Mapping[str, str]] | None = None
 
     @property
     def every_engine(self) -> list[str]:

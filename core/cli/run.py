@@ -188,7 +188,7 @@ class Run(Isolated, WithRecordings):
         plan = _plan_run(self, registry)
         precision: Any = None
         if self.bench is not None:
-            from ..studies.bench.engines import efforts_in
+            from ..extensions.laboratory.bench.engines import efforts_in
 
             precision = efforts_in(self.bench)
         with delivery.json_only() if self.json == "-" else nullcontext():
@@ -319,8 +319,8 @@ def _solve(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | Non
     """Return the results, the problems, the run in the history, and the status if a signal stopped
     the run early.
     """
+    from ..extensions.cluster.distributed import ClusterError
     from ..harness import run as running
-    from ..harness.workers.distributed import ClusterError
 
     solver, settings = shared_options.solver(options, plan.engines)
     if plan.unread:

@@ -124,7 +124,7 @@ def unreachable(options: Any) -> list[str]:
     """
     if options.scheduler is None:
         return []
-    from ..harness.workers.distributed import ClusterError, connect_client, load_distributed
+    from ..extensions.cluster.distributed import ClusterError, connect_client, load_distributed
 
     try:
         with connect_client(load_distributed(), options.scheduler):
@@ -135,7 +135,7 @@ def unreachable(options: Any) -> list[str]:
 
 def solver(options: Isolated, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
     """Return the solver of the pairs, and its settings for the results."""
-    from ..harness.workers.distributed import on_cluster
+    from ..extensions.cluster.distributed import on_cluster
     from ..harness.workers.pool import solver_for
 
     limits = Limits(options.timeout or TIMEOUT, options.memory or MEMORY)
@@ -267,8 +267,8 @@ def foreign_engines(
     """
     if not (options.engine_command or options.fmu):
         return []
-    from ..recorded.engine import ProgramEngine
-    from ..recorded.fmu import read_fmu
+    from ..extensions.recorded.engine import ProgramEngine
+    from ..extensions.recorded.fmu import read_fmu
 
     if options.fmu and len(cases) != 1:
         raise KincheckError(
@@ -300,11 +300,11 @@ def recorded_engines(
     """
     import numpy as np
 
-    from ..recorded.engine import RecordedEngine
-    from ..recorded.meaning import Meaning, Reader, read_accuracy
-    from ..recorded.readers import Head, read_recording
-    from ..recorded.samples import samples_of
-    from ..recorded.sweep import at_samples
+    from ..extensions.recorded.engine import RecordedEngine
+    from ..extensions.recorded.meaning import Meaning, Reader, read_accuracy
+    from ..extensions.recorded.readers import Head, read_recording
+    from ..extensions.recorded.samples import samples_of
+    from ..extensions.recorded.sweep import at_samples
 
     engines: list[Engine] = []
     found: Case | None = None

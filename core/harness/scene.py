@@ -11,8 +11,8 @@ import numpy as np
 
 from ..case.case import MARKER, Case
 from ..case.measures import DriverEffort, JointForce
-from ..case.suspension import MotionRatio, SuspensionOutput
 from ..errors import KincheckError
+from ..extensions.hardpoints.suspension import MotionRatio, SuspensionOutput
 from ..joints import Kind
 from ..joints.base import unit
 from ..kinematics import NativeSolver

@@ -14,9 +14,9 @@ from typing import TypeAlias
 import numpy as np
 
 from ..case.case import TIME, Case, Series, pace
-from ..case.suspension import Camber, Toe, camber_of_front_view
 from ..case.units import ANGLES, LENGTHS, SECOND, Unit
 from ..errors import shortened
+from ..extensions.hardpoints.suspension import Camber, Toe, camber_of_front_view
 from ..trajectory import QUANTITIES, Array
 from ..unit_text import motion_word, value_text
 from .compare import Curve, as_array, curve_of, deviation

@@ -12,6 +12,7 @@ This folder is the package kincheck; its parts are in other folders. Imports of 
 because in the sources a relative import would look in this folder.
 """
 
+from collections.abc import Iterable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -19,51 +20,45 @@ from kincheck import core
 
 if TYPE_CHECKING:
     from kincheck import primitives
-    from kincheck.by_name import (
-        check_engine,
-        compare,
-        compliance,
-        explain,
-        free,
-        live,
-        load,
-        report,
-        run,
-        sweep,
-    )
+    from kincheck.by_name import check_engine, load, report, run
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
 
-__all__ = [
-    "check_engine",
-    "compare",
-    "compliance",
-    "explain",
-    "free",
-    "live",
-    "load",
-    "primitives",
-    "report",
-    "run",
-    "sweep",
-]
-__all__ += core.__all__
+    __all__ = ["check_engine", "load", "primitives", "report", "run"]
+    __all__ += core.__all__
+
+    # what extensions offer has no type here: the kernel names none of them
+    def __getattr__(name: str) -> Any: ...
 
 
-if not TYPE_CHECKING:  # otherwise type checkers would accept any name
+_OWN = ("check_engine", "load", "primitives", "report", "run")
+
+
+if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
-        """Import a public name on first use."""
-        if name not in __all__:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        if name == "primitives":
+        """Import a public name on first use: of this package, of the core, or of an extension."""
+        if name == "__all__":
+            found = __dir__()
+        elif name == "primitives":
             found = import_module("kincheck.primitives")
+        elif name in _OWN:
+            found = getattr(import_module("kincheck.by_name"), name)
+        elif name in core.__all__:
+            found = getattr(core, name)
+        elif name in _offered():
+            found = import_module("kincheck.by_name").offered(name)
         else:
-            module = core if name in core.__all__ else import_module("kincheck.by_name")
-            found = getattr(module, name)
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         globals()[name] = found
         return found
 
 
 def __dir__() -> list[str]:
     """Return the public names, whether loaded or not."""
-    return sorted({*globals(), *__all__})
+    return sorted({*_OWN, *core.__all__, *_offered()})
+
+
+def _offered() -> Iterable[str]:
+    from kincheck.core.doors import offers
+
+    return offers("public")

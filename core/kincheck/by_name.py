@@ -1,53 +1,29 @@
 """Functions on cases and engines by name, as on the command line."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any
 
 from kincheck.core import KincheckError
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
 from kincheck.core.cli.checks import CheckEngine
-from kincheck.core.cli.compare import Compare
-from kincheck.core.cli.examine import Explain, MoveFreely
-from kincheck.core.cli.main import registry
-from kincheck.core.cli.registry import Registry
+from kincheck.core.cli.main import function, registry
+from kincheck.core.cli.parser import Command
 from kincheck.core.cli.run import Run
-from kincheck.core.cli.serve import Serve
-from kincheck.core.cli.sweep import Sweep
-from kincheck.core.harness.engine import Engine
+from kincheck.core.doors import offers
 from kincheck.core.harness.record import Results
-from kincheck.core.options import function_of, several
 from kincheck.core.report.report import write_report
-from kincheck.core.studies.compliance import study
-from kincheck.core.studies.compliance.study import ComplianceResults
 
-_Options = ParamSpec("_Options")
-_Answer = TypeVar("_Answer")
-_Answer_co = TypeVar("_Answer_co", covariant=True)
+run = function("run", Run)
+check_engine = function("check_engine", CheckEngine)
 
 
-class _Command(Protocol[_Answer_co]):
-    def answer(self, registry: Registry) -> _Answer_co: ...
-
-
-def _function(
-    name: str, command: Callable[_Options, _Command[_Answer]]
-) -> Callable[_Options, _Answer]:
-    """Return the function of a command: its arguments are the options."""
-
-    found: Any = function_of(name, command, lambda options: options.answer(registry()))
-    return found
-
-
-run = _function("run", Run)
-explain = _function("explain", Explain)
-sweep = _function("sweep", Sweep)
-free = _function("free", MoveFreely)
-compare = _function("compare", Compare)
-check_engine = _function("check_engine", CheckEngine)
-live = _function("live", Serve)
+def offered(name: str) -> Any:
+    """Return what an extension offers under a name; of a command, its function."""
+    found: Any = offers("public")[name].load()
+    return (
+        function(name, found) if isinstance(found, type) and issubclass(found, Command) else found
+    )
 
 
 def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:
@@ -61,40 +37,6 @@ def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:
         KincheckError: there is no such case, or its file is invalid.
     """
     return registry().find_case(name, supplied, driven=False)
-
-
-def compliance(
-    case: str | Path | Case,
-    travel: Sequence[float] | None = None,
-    loads: Mapping[str, float | Sequence[float]] | None = None,
-    axle: str = "heave",
-    *,
-    engines: str | Engine | Sequence[str | Engine] = (),
-    jobs: int | None = None,
-) -> ComplianceResults:
-    """Return the kinematics and compliance of a suspension, as the command `kincheck kc` does.
-
-    Args:
-        case: name, path or case.
-        travel: of the wheel from design [m], by default 60 mm up and down; of the steering if
-            `axle` is "steer".
-        loads: values by load, "lateral", "longitudinal", "braking" or "aligning" [N, N m], each
-            applied at design; one number acts over all travel.
-        axle: motion of both wheels: "heave", "roll" or "steer".
-        engines: names or engines that find the equilibria by themselves; `checked` has their
-            records, judged against native.
-        jobs: number of worker processes, as of `run`.
-
-    Raises:
-        KincheckError: the case lacks facts, or a sample has no equilibrium; the message gives the
-            last load with one.
-    """
-    found = study.compliance(case if isinstance(case, Case) else load(case), travel, loads, axle)
-    if found.failures:
-        raise KincheckError("\n".join(found.failures))
-    if not (team := several(engines)):
-        return found
-    return replace(found, checked=run(found.cases, ("native", *team), jobs=jobs))
 
 
 def report(results: Results, file: str | Path) -> None:

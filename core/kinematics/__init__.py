@@ -8,11 +8,8 @@ Solve:
     solve_designs      many designs over a sweep, each with its own geometry
     StaticModel        equilibria of a mechanism whose drivers are held, and its compliance
     forces_of          reactions of joints and efforts of drivers of a solved motion
-    free_motion        the motion without drivers, by masses and loads
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
-    find_assemblies    all closed poses
-    FreePoses          poses reached without drivers, and bodies placed to fit others
     angle_with_turns   the angle of a joint, followed from the design
     attitude_with_turns
                        the attitude of a body, followed from the design
@@ -30,8 +27,6 @@ Describe:
     reduce_rows, largest_residual                   rows that are redundant but for digits
     kinds, places, placed                           the geometry by name
     LoadPlace, load_places                          masses and loads by name
-    Ranks, joints_that_free, conditioning, describe_screws   rank, conditioning and screws at a pose
-    prove, prove_pose                               samples and poses enclosed in balls
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
     is_continuation, continuous, regular_between    tests of a step
     motion_defects                                  a motion of bodies against the constraints
@@ -42,12 +37,9 @@ The folders:
     structure        degrees of freedom, redundant rows, components, sparse factors
     compiled         one mechanism as compiled programs: request, programs, model, routes
     continuation     the walk along a path, singular poses, curves by arc length
-    blocks           large mechanisms as lists of blocks: components, or one sparse system
     statics          equilibria with springs, bushings and loads, and their compliance
     forces           the equations of forces, and the forces of a solved motion
     assembly         closed poses from estimates and random starts
-    diagnosis        rank, conditioning and screws at a pose
-    verified         samples enclosed in balls by Krawczyk's test
 """
 
 # pyright: reportUnusedImport=false
@@ -57,24 +49,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .assembly.assemble import Assembled, assemble
-    from .assembly.assembly_modes import Assemblies, Assembly, find_assemblies
     from .compiled.request import LAST_ITERATION
     from .compiled.routes import Start, notes_on_start, solve_from_start, start_of
     from .continuation.trace import Curve, Event, trace
     from .design_batch import Designs, Variants, solve_designs
     from .design_forces import ForcesOfDesigns
-    from .diagnosis.conditioning import Conditioning, Gradient, PoseConditioning, conditioning
-    from .diagnosis.rank import (
-        Blocked,
-        ComponentCount,
-        Dependency,
-        NamedRow,
-        Ranks,
-        Screw,
-        Violation,
-        describe_screws,
-        joints_that_free,
-    )
     from .followed import (
         DOUBTFUL,
         agreement,
@@ -95,8 +74,6 @@ if TYPE_CHECKING:
     from .formulation.cartesian import COLUMNS, Cartesian
     from .formulation.constraints import Frames, Relation, Style, constraints, unit_near
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
-    from .free_dynamics import FreeMotion, free_motion
-    from .free_poses import FreePoses, Poses, Walked
     from .motion_solver import Solver
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import solve
@@ -116,24 +93,14 @@ if TYPE_CHECKING:
     from .statics.equilibrium import Equilibria, StaticModel
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
-    from .verified.exact import Exact, Reading, as_decimal, as_double
-    from .verified.exact_forces import EnclosedForces, UnprovedError
-    from .verified.krawczyk import Enclosure
-    from .verified.proofs import Drives, PoseState, Proofs, prove, prove_pose
 
 _NAMES = {
     "assembly.assemble": "Assembled assemble",
-    "assembly.assembly_modes": "Assemblies Assembly find_assemblies",
     "compiled.request": "LAST_ITERATION",
     "compiled.routes": "Start notes_on_start solve_from_start start_of",
     "continuation.trace": "Curve Event trace",
     "design_batch": "Designs Variants solve_designs",
     "design_forces": "ForcesOfDesigns",
-    "diagnosis.conditioning": "Conditioning Gradient PoseConditioning conditioning",
-    "diagnosis.rank": (
-        "Blocked ComponentCount Dependency NamedRow Ranks Screw Violation describe_screws"
-        " joints_that_free"
-    ),
     "followed": (
         "DOUBTFUL agreement angle_with_turns attitude_with_turns follower in_doubt near_design"
     ),
@@ -144,8 +111,6 @@ _NAMES = {
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
     "formulation.parameters": "LoadPlace kinds load_places placed places",
-    "free_dynamics": "FreeMotion free_motion",
-    "free_poses": "FreePoses Poses Walked",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "motion_solver": "Solver",
     "one_design": "solve",
@@ -157,10 +122,6 @@ _NAMES = {
     "statics.equilibrium": "Equilibria StaticModel",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",
-    "verified.exact": "Exact Reading as_decimal as_double",
-    "verified.exact_forces": "EnclosedForces UnprovedError",
-    "verified.krawczyk": "Enclosure",
-    "verified.proofs": "Drives PoseState Proofs prove prove_pose",
 }
 """Module: its public names. No module of this folder has such a name: once imported, it would take
 the place of the name.

@@ -33,8 +33,8 @@ from .formulation.constraints import Style, frames
 from .structure.degrees_of_freedom import require_driven
 
 if TYPE_CHECKING:
-    from .blocks.component_lanes import ComponentLanes
-    from .blocks.sparse_lanes import SparseLanes
+    from ..extensions.blocks.component_lanes import ComponentLanes
+    from ..extensions.blocks.sparse_lanes import SparseLanes
 
 Solver = Callable[[float], Trajectory]
 """Solves what it was made for, to a tolerance."""
@@ -71,8 +71,8 @@ def by_blocks(
     unless it is given.
     """
     # few mechanisms are so large: the others need not wait for the import
-    from .blocks.sparse_lanes import SparseLanes
-    from .blocks.sweep import BlockSweep
+    from ..extensions.blocks.sparse_lanes import SparseLanes
+    from ..extensions.blocks.sweep import BlockSweep
     from .structure.components import components
 
     parts = None
@@ -100,8 +100,8 @@ def _lanes(
 
     Redundant rows may be matched with its unknowns, and the rows it needs with those of others.
     """
-    from .blocks.component_lanes import ComponentLanes
-    from .blocks.sparse_lanes import SparseLanes
+    from ..extensions.blocks.component_lanes import ComponentLanes
+    from ..extensions.blocks.sparse_lanes import SparseLanes
 
     try:
         return ComponentLanes(mechanism, request, parts)

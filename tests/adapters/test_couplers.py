@@ -6,12 +6,13 @@ from dataclasses import replace
 import kincheck
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.cases.jet import Jet, cos, sin, steady
 from kincheck.core.case.io.case_file import case_text, load_case
-from kincheck.core.case.io.model_writer import written
-from kincheck.core.case.models.undriven import undriven_case, undriven_file
 from kincheck.core.errors import MechanismError
+from kincheck.core.extensions.exports.command import writer_of
+from kincheck.core.extensions.exports.model_writer import written
+from kincheck.core.extensions.same.undriven import undriven_case, undriven_file
+from kincheck.core.extensions.same.verdict import compare
 from kincheck.core.joints import (
     Cylindrical,
     Distance,
@@ -24,7 +25,6 @@ from kincheck.core.joints import (
     Universal,
 )
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Sine
-from kincheck.core.studies.same import compare
 
 from ..support.engine_motion import (
     ENGINES,
@@ -309,7 +309,7 @@ def test_linear_coupler_in_written_files(tmp_path):
     (file := tmp_path / "again.toml").write_text(case_text(case))
     assert load_case(file).mechanism.couplers == case.mechanism.couplers
     for form in ("mjcf", "urdf"):
-        for suffix, text in written(case, adapters.writer(form), None).items():
+        for suffix, text in written(case, writer_of(form), None).items():
             (tmp_path / f"written_{form}{suffix}").write_text(text)
     for name in ("written_mjcf.xml", "written_urdf.urdf"):
         same = compare(undriven_case(case, "case"), undriven_file(tmp_path / name), {})

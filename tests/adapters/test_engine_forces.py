@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.case.case import TIME, Sweep
+from kincheck.core.extensions.laboratory.stress.families.arms import random_arm
+from kincheck.core.extensions.laboratory.stress.families.loops import random_mechanism
 from kincheck.core.joints import (
     Cylindrical,
     Fixed,
@@ -24,8 +26,6 @@ from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism
 from kincheck.core.mechanism.motions import JointAngle
-from kincheck.core.studies.stress.families.arms import random_arm
-from kincheck.core.studies.stress.families.loops import random_mechanism
 
 from ..support.driven_chains import (
     COUPLINGS,

@@ -11,7 +11,9 @@ from kincheck.cases.jet import cos, sin, sqrt, steady
 from kincheck.core import Body, Joint, JointAngle, Revolute, Translational
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, cross, vec
-from kincheck.core.case.io.model_writer import written
+from kincheck.core.doors import offers
+from kincheck.core.extensions.exports.command import writer_of
+from kincheck.core.extensions.exports.model_writer import written
 from kincheck.core.joints import Planar
 from kincheck.core.joints.base import directions, position, triad, unit
 from kincheck.core.mechanism.mechanism import with_equivalents
@@ -91,9 +93,9 @@ def test_user_joint_equivalent_is_simulated(name, atol):
     assert_motion(found.points["tip"], motion()[0], atol=(atol,))
 
 
-@pytest.mark.parametrize("name", adapters.WRITERS)
+@pytest.mark.parametrize("name", offers("writers"))
 def test_written_model_holds_joint_equivalent(name):
-    assert "slot_block" in "".join(written(quick_return(), adapters.writer(name)).values())
+    assert "slot_block" in "".join(written(quick_return(), writer_of(name)).values())
 
 
 def test_subclass_with_other_primitives_is_refused():

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
+from kincheck import cases
 from kincheck.adapters.shared.poses import at_start
 from kincheck.core import (
     Gear,
@@ -17,12 +17,13 @@ from kincheck.core import (
     SolveError,
     Spherical,
 )
-from kincheck.core.case.io.model_writer import way_to, written
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.case.models.files import load
 from kincheck.core.cli import main
-from kincheck.core.cli.files import FORMATS
+from kincheck.core.doors import offers
+from kincheck.core.extensions.exports.command import writer_of
+from kincheck.core.extensions.exports.model_writer import way_to, written
 from kincheck.core.joints import Joint
 from kincheck.core.kinematics import NativeSolver, largest_residual
 from kincheck.core.trajectory import BodyMotion
@@ -35,7 +36,7 @@ from ..support.mechanisms import mcpherson, slider_crank
 from ..support.written_mechanisms import CASES, Z, assert_read, case, coupled_loop, way
 
 
-@pytest.mark.parametrize("to", adapters.WRITERS)
+@pytest.mark.parametrize("to", offers("writers"))
 def test_export_names_joint_without_counterpart(to):
     class Mine(Spherical):
         pass
@@ -48,7 +49,7 @@ def test_export_names_joint_without_counterpart(to):
         ],
     )
     with pytest.raises(KincheckError, match=r"joint 'ball' \(spherical\) has no counterpart in"):
-        adapters.writer(to)(mine, way("mcpherson", False), {})
+        writer_of(to)(mine, way("mcpherson", False), {})
 
 
 def renamed(mechanism, **names):
@@ -71,18 +72,18 @@ def renamed(mechanism, **names):
 def test_export_refuses_taken_names():
     world = renamed(slider_crank(), crank="world")
     with pytest.raises(KincheckError, match="'world' is taken"):
-        adapters.writer("mjcf")(*world, {})
+        writer_of("mjcf")(*world, {})
     mechanism, path = renamed(slider_crank())
     twice = [*mechanism.points, Point("rod.first", "crank", (0.0, 0.0, 0.0))]
     with pytest.raises(KincheckError, match=r"'rod\.first' is taken"):
-        adapters.writer("mjcf")(replace(mechanism, points=twice), path, {})
+        writer_of("mjcf")(replace(mechanism, points=twice), path, {})
 
 
 @pytest.mark.parametrize("to", ["osim", "sdf"])
 def test_export_of_names_with_blanks(to, tmp_path):
     """OpenSim ends the process at a name with a blank."""
     other, path = renamed(slider_crank(), crank="left crank", rod="rod/2")
-    assert_read(read(to, adapters.writer(to)(other, path, {}), other, tmp_path), other, path, True)
+    assert_read(read(to, writer_of(to)(other, path, {}), other, tmp_path), other, path, True)
 
 
 def test_sdf_export_refuses_two_mimics():
@@ -90,7 +91,7 @@ def test_sdf_export_refuses_two_mimics():
     again = [Gear(name, ("A", "A2"), 1.0) for name in ("third", "fourth")]
     mechanism = replace(mechanism, couplers=[*mechanism.couplers, *again])
     with pytest.raises(KincheckError, match="mimics one other"):
-        adapters.writer("sdf")(mechanism, way("coupled_loop", False), {})
+        writer_of("sdf")(mechanism, way("coupled_loop", False), {})
 
 
 def test_export_start_out_of_reach_fails():
@@ -155,7 +156,7 @@ def test_export_command_refuses_bad_arguments(argv, said, tmp_path, monkeypatch,
 
 
 def test_export_help_lists_formats(capsys):
-    assert tuple(FORMATS) == adapters.WRITERS
+    assert [*offers("formats")] == [*offers("writers")]
     for command in ("export", "assemblies"):
         assert main.main([command, "--help"]) == 0
         said = " ".join(capsys.readouterr().out.split())
@@ -167,7 +168,7 @@ def test_export_help_lists_formats(capsys):
 
 def reading(to, name, folder, elsewhere=True):
     mechanism, path = CASES[name].mechanism, way(name, elsewhere)
-    return read(to, adapters.writer(to)(mechanism, path, {}), mechanism, folder), path
+    return read(to, writer_of(to)(mechanism, path, {}), mechanism, folder), path
 
 
 NO_CURVE = {"exudyn": "Exudyn", "sdf": "SDF"}
@@ -228,7 +229,7 @@ def test_written_model_shows_wrong_start(to, tmp_path):
     longer = replace(
         mechanism, joints=[*mechanism.joints[:-1], replace(rod, length=rod.design_distance + 1e-3)]
     )
-    texts = adapters.writer(to)(longer, way("mcpherson", True), {})
+    texts = writer_of(to)(longer, way("mcpherson", True), {})
     found = read(to, texts, longer, tmp_path)
     assert np.linalg.norm(found.residuals) == pytest.approx(1e-3, abs=1e-14)
 
@@ -252,7 +253,7 @@ STEP = 0.02
 
 def exported(case, kind, folder):
     """Write a model and the files beside it; return its file."""
-    texts = written(case, adapters.writer(kind))
+    texts = written(case, writer_of(kind))
     for ending, text in texts.items():
         (folder / f"model{ending}").write_text(text)
     return folder / f"model{next(iter(texts))}"

@@ -6,15 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck.core.case.io.case_file import load_case
+from kincheck.core.extensions.laboratory.stress.families import FAMILIES
+from kincheck.core.extensions.laboratory.stress.families.base import as_case
+from kincheck.core.extensions.laboratory.stress.families.linkages import (
+    any_plane,
+    polar,
+    slider_crank,
+)
+from kincheck.core.extensions.laboratory.stress.run import specimen
+from kincheck.core.extensions.laboratory.stress.verdicts import Verdict, judge_answer, once
+from kincheck.core.extensions.laboratory.truth.fold import first_fold
+from kincheck.core.extensions.laboratory.truth.motion import Reach, follow_motion
 from kincheck.core.harness.execution import Pair
 from kincheck.core.kinematics import continuous, is_continuation, regular_between
-from kincheck.core.studies.stress.families import FAMILIES
-from kincheck.core.studies.stress.families.base import as_case
-from kincheck.core.studies.stress.families.linkages import any_plane, polar, slider_crank
-from kincheck.core.studies.stress.run import specimen
-from kincheck.core.studies.stress.verdicts import Verdict, judge_answer, once
-from kincheck.core.studies.truth.fold import first_fold
-from kincheck.core.studies.truth.motion import Reach, follow_motion
 
 from ..support.engine_motion import SIMULATORS, installed, rotation
 

@@ -6,10 +6,10 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.core import Body, Cylindrical, Mechanism, Point, Revolute, Translational
-from kincheck.core.case.io.model_writer import written
-from kincheck.core.kinematics import free_motion
+from kincheck.core.extensions.exports.command import writer_of
+from kincheck.core.extensions.exports.model_writer import written
+from kincheck.core.extensions.free.free_dynamics import free_motion
 
 from ..support.engine_motion import motion_case
 from ..support.mechanisms import ORIGIN
@@ -69,7 +69,7 @@ PLAIN = """<mujoco><option gravity="0 -9.80665 0"/><worldbody><body name="crank"
 
 
 def texts_of(mechanism, to):
-    return written(motion_case(mechanism, [0.0, 1.0]), adapters.writer(to))
+    return written(motion_case(mechanism, [0.0, 1.0]), writer_of(to))
 
 
 def text_of(mechanism):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
+from kincheck import cases
 from kincheck.core import (
     Body,
     Cylindrical,
@@ -18,9 +18,11 @@ from kincheck.core import (
     Translational,
     Universal,
 )
-from kincheck.core.case.io.model_writer import way_to, written
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
+from kincheck.core.doors import offers
+from kincheck.core.extensions.exports.command import writer_of
+from kincheck.core.extensions.exports.model_writer import way_to, written
 from kincheck.core.mechanism.loads import Bushing, Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement
@@ -143,7 +145,7 @@ def slowed(clock=SPRINGS[1]):
 
 
 def texts(to, mechanism):
-    return adapters.writer(to)(mechanism, way_to(motion_case(mechanism, [ANGLE]), ANGLE), {})
+    return writer_of(to)(mechanism, way_to(motion_case(mechanism, [ANGLE]), ANGLE), {})
 
 
 def started(text):
@@ -265,7 +267,7 @@ def test_written_urdf_bushing_is_kept(tmp_path, turning):
     soft = rubber("euler_parameters", (turning, 0.0, 5.0))
     mechanism = arm(forces=[*SPRINGS[:1], replace(soft, damping=(1.0, 2.0, 3.0))])
     case = motion_case(mechanism, [ANGLE])
-    for suffix, text in written(case, adapters.writer("urdf")).items():
+    for suffix, text in written(case, writer_of("urdf")).items():
         (tmp_path / f"arm{suffix}").write_text(text)
     spring, found = load(tmp_path / "arm.urdf", Supplied(drive=("pin:0:1",))).mechanism.forces
     assert vars(spring) == vars(SPRINGS[0])
@@ -327,13 +329,13 @@ def test_written_model_names_omitted_springs(to, names):
     assert told == names.split()
 
 
-@pytest.mark.parametrize("to", adapters.WRITERS)
+@pytest.mark.parametrize("to", offers("writers"))
 def test_written_model_without_masses(to):
     """Gravity alone moves nothing: the file is that of the mechanism without."""
     plain = replace(arm(), bodies=[Body("arm", ORIGIN, TURNED)], gravity=(0.0, 0.0, 0.0))
     falling = replace(plain, gravity=(0.0, 0.0, -9.8))
     assert texts(to, falling) == texts(to, plain)
-    for text in written(cases.load("five_bar"), adapters.writer(to)).values():
+    for text in written(cases.load("five_bar"), writer_of(to)).values():
         assert "Left out" not in text
 
 
@@ -410,7 +412,7 @@ TURNED_COORDINATES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.
 
 
 def pose(to, case, values, folder, start=None):
-    texts = written(case, adapters.writer(to.split()[0]), start)
+    texts = written(case, writer_of(to.split()[0]), start)
     return read(to, texts, case.mechanism, folder, values).bodies["arm"]
 
 

@@ -17,12 +17,12 @@ from kincheck.core.case.io.schema import keys_of
 from kincheck.core.cli import main
 from kincheck.core.cli.lists import SCHEMAS, schema_of
 from kincheck.core.errors import CaseError, MechanismError
+from kincheck.core.extensions.sweep import variation_schema
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Coupler, Joint, Spherical
 from kincheck.core.joints.base import directions, position
 from kincheck.core.mechanism.loads import ELEMENTS
 from kincheck.core.mechanism.motions import Motion
-from kincheck.core.studies.variation import variation_schema
 
 # Rows as in textbooks: six less the freedoms left.
 ROWS = {

@@ -10,9 +10,9 @@ from kincheck import cases
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 
 from ..support.case_texts import complains, refused, write
 from ..support.model_poses import solution

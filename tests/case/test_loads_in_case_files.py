@@ -16,15 +16,15 @@ from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.explain.diagnose import diagnose
+from kincheck.core.extensions.explain.text import print_diagnosis
+from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.forces import Multipliers
 from kincheck.core.harness.run import run
 from kincheck.core.kinematics import NativeSolver, solve
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.report.terminal import console
-from kincheck.core.studies.diagnosis.diagnose import diagnose
-from kincheck.core.studies.diagnosis.text import print_diagnosis
-from kincheck.core.studies.verified_reference import prove_case
 
 from ..oracles import naive
 from ..support.case_texts import complains, edited, write

@@ -16,9 +16,9 @@ from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.case.io.reference_file import read, series, with_proved_references
 from kincheck.core.errors import KincheckError
+from kincheck.core.extensions.proofs import ball_executor
+from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.jet import arctan2
-from kincheck.core.program import ball_executor
-from kincheck.core.studies.verified_reference import prove_case
 
 from ..support.case_texts import refused
 from ..support.fakes import RADIUS, crank

@@ -11,9 +11,9 @@ from kincheck.core.case.io.foreign import MOST_MEMBERS
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.case.models.files import load, read_tree
-from kincheck.core.case.models.hardpoints.rows import MOST_LINES
-from kincheck.core.case.models.trees.element import DEEPEST, MOST_ELEMENTS, parse_xml
-from kincheck.core.case.models.trees.tree import MOST_TIES
+from kincheck.core.extensions.hardpoints.rows import MOST_LINES
+from kincheck.core.extensions.trees.element import DEEPEST, MOST_ELEMENTS, parse_xml
+from kincheck.core.extensions.trees.tree import MOST_TIES
 
 from ..support.case_texts import complains, refused, write
 from ..support.model_files import driven

@@ -25,9 +25,9 @@ from kincheck.cases.jet import Jet, steady
 from kincheck.cases.vectors import Circle
 from kincheck.core import Body, CaseError, Distance, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core.case.case import Output, Truth, without_forces
+from kincheck.core.extensions.laboratory.truth.forces import known_forces
+from kincheck.core.extensions.laboratory.truth.motion import follow_motion
 from kincheck.core.harness.compare import deviations, output_series
-from kincheck.core.studies.truth.forces import known_forces
-from kincheck.core.studies.truth.motion import follow_motion
 
 from ..support.fakes import swept
 

@@ -5,8 +5,8 @@ anything is computed.
 import kincheck
 import pytest
 from kincheck.core.case.io.atomic_files import unwritable
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 
 from ..support.case_texts import rows
 

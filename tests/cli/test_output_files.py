@@ -124,7 +124,7 @@ def test_full_disk_keeps_previous_store(here):
 KILLED = """
 import os, signal, sys
 from kincheck.core.cli.main import main
-from kincheck.core.studies.tolerance.chunk_files import ParquetStore
+from kincheck.core.extensions.sweep.chunk_files import ParquetStore
 
 write = ParquetStore.write
 

@@ -4,8 +4,8 @@ the title.
 
 from pathlib import Path
 
-from kincheck.core.case.models.adams.dataset import ARGUMENTS, KNOWN
 from kincheck.core.case.models.files import load
+from kincheck.core.extensions.adams.dataset import ARGUMENTS, KNOWN
 
 from .fuzzing import changing, read_or_refused, said, written
 from .trees import changed_text

@@ -5,8 +5,8 @@ from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.document import fault
 from kincheck.core.case.io.mechanism_sections import DRIVERS
 from kincheck.core.case.measures import Measure
-from kincheck.core.case.suspension import SuspensionOutput
 from kincheck.core.errors import KincheckError
+from kincheck.core.extensions.hardpoints.suspension import SuspensionOutput
 from kincheck.core.joints import Coupler, Joint
 from kincheck.core.kinematics import require_driven
 from kincheck.core.mechanism.motions import Motion

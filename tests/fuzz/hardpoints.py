@@ -10,9 +10,9 @@ from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.table import Cell, Table
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.read import case_of_hardpoints
-from kincheck.core.case.models.hardpoints.rows import read_rows
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.extensions.hardpoints.read import case_of_hardpoints
+from kincheck.core.extensions.hardpoints.rows import read_rows
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from .fuzzing import FOLDER, changing, read_or_refused, written
 from .keeping import seeds_in_file

@@ -5,7 +5,7 @@ of the input.
 import re
 from pathlib import Path
 
-from kincheck.core.case.models.trees.mjcf_language import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, ROOT
+from kincheck.core.extensions.trees.mjcf_language import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, ROOT
 
 from .fuzzing import changing, reading
 from .trees import changed_xml

@@ -1,6 +1,6 @@
 """Models of OpenSim; a coordinate named in the model is driven."""
 
-from kincheck.core.case.models.trees.osim import (
+from kincheck.core.extensions.trees.osim import (
     AXES,
     CHAINS,
     CONSTRAINTS,

@@ -1,7 +1,7 @@
 """SDF models; an attribute of the root says how they are driven."""
 
-from kincheck.core.case.models.trees.robot_elements import STRUT
-from kincheck.core.case.models.trees.sdf import IN_AXIS, IN_JOINT, IN_LINK, IN_MODEL, TYPES
+from kincheck.core.extensions.trees.robot_elements import STRUT
+from kincheck.core.extensions.trees.sdf import IN_AXIS, IN_JOINT, IN_LINK, IN_MODEL, TYPES
 
 from .fuzzing import changing, reading
 from .trees import changed_xml

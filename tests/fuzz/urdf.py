@@ -5,7 +5,7 @@ files.
 import html
 import re
 
-from kincheck.core.case.models.trees.urdf import (
+from kincheck.core.extensions.trees.urdf import (
     IN_CONSTRAINT,
     IN_JOINT,
     IN_ROBOT,

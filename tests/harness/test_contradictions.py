@@ -9,14 +9,14 @@ from kincheck.adapters import engine
 from kincheck.core.case.case import Series
 from kincheck.core.case.closing import held_case
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES
+from kincheck.core.extensions.sweep.study import Study
 from kincheck.core.harness.execution import Answer, Attempt, Failure, Pair, attempt
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.mechanism.motions import Waypoints
 from kincheck.core.report.report import headline
-from kincheck.core.studies.tolerance.study import Study
 
 from ..oracles.rods import Carrier
 from ..support.fakes import (

@@ -12,8 +12,8 @@ from kincheck.adapters import engine
 from kincheck.core.case.case import Origin, Series, Truth
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.notes import notes
-from kincheck.core.case.suspension import camber_of_front_view
 from kincheck.core.cli import main
+from kincheck.core.extensions.hardpoints.suspension import camber_of_front_view
 from kincheck.core.harness.compare import Curve
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json

@@ -19,8 +19,8 @@ from kincheck.core import (
     solve_designs,
 )
 from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core.extensions.explain.diagnose import diagnose
 from kincheck.core.mechanism.motions import Absolute, Ramp, Sine
-from kincheck.core.studies.diagnosis import diagnose
 
 from ..support.mechanisms import Z
 

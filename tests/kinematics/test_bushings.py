@@ -12,8 +12,10 @@ from kincheck import adapters
 from kincheck.adapters.shared.force_solution import curve_force, elastic_torque
 from kincheck.core.algebra import ZERO, Quat, vec
 from kincheck.core.case.io.case_file import case_text, load_case
-from kincheck.core.case.io.model_writer import written
+from kincheck.core.doors import offers
 from kincheck.core.errors import KincheckError, MechanismError
+from kincheck.core.extensions.exports.command import writer_of
+from kincheck.core.extensions.exports.model_writer import written
 from kincheck.core.kinematics.forces.equations import BodyStates, bushing, force_of
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.mechanism.body import Body
@@ -183,10 +185,10 @@ def test_bushing_on_unknown_body_is_refused():
         Mechanism("m", [Body("a")], [], forces=[Bushing("b", "wheel", "a", ORIGIN, stiffness=1.0)])
 
 
-@pytest.mark.parametrize("target", adapters.WRITERS)
+@pytest.mark.parametrize("target", offers("writers"))
 def test_writers_name_omitted_bushings_and_curves(tmp_path, target):
     case = bushed(tmp_path, "cardan")
-    text = "".join(map(str, written(case, adapters.writer(target)).values()))
+    text = "".join(map(str, written(case, writer_of(target)).values()))
     assert re.search(r"Left out:[^\n]*force 'b' \(bushing\)[^\n]*force 's'", text)
 
 

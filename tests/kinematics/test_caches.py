@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from kincheck.core import Spherical, solve, solve_designs
 from kincheck.core.caches import KEYS, ThreadCache, cache_last, clear_caches
-from kincheck.core.kinematics.blocks import component_lanes, sparse_lanes
-from kincheck.core.kinematics.blocks import sweep as block_sweep
+from kincheck.core.extensions.blocks import component_lanes, sparse_lanes
+from kincheck.core.extensions.blocks import sweep as block_sweep
+from kincheck.core.extensions.laboratory.bench.size import circle
 from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled import routes as samples
 from kincheck.core.kinematics.compiled.compiled_model import source_files
 from kincheck.core.kinematics.continuation import walk
 from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
-from kincheck.core.studies.bench.size import circle
 
 from ..support.mechanisms import chain, mcpherson, solve_all
 

@@ -5,10 +5,10 @@ import pytest
 
 pytest.importorskip("llvmlite")
 from kincheck.core.case.joint_probe import probes
+from kincheck.core.extensions.laboratory.bench.size import ring
 from kincheck.core.kinematics.compiled.dense_equations import System
 from kincheck.core.kinematics.compiled.programs import Tracer
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.studies.bench.size import ring
 
 from ..support.block_structures import chain_of_hinges, torus
 from ..support.mechanisms import gears

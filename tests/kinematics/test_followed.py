@@ -13,6 +13,7 @@ from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.measures import Component, Orientation
 from kincheck.core.case.measures import JointAngle as Angle
 from kincheck.core.case.quantity import with_markers
+from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
@@ -31,7 +32,6 @@ from kincheck.core.kinematics.one_design import prepare as prepare_one
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Path, Ramp, Sine
-from kincheck.core.studies.verified_reference import prove_case
 
 from ..support.mechanisms import X, Z
 

@@ -22,8 +22,8 @@ from kincheck.core import (
     Translational,
     Universal,
 )
+from kincheck.core.extensions.explain.rank import free_motions
 from kincheck.core.failures import FailureKind
-from kincheck.core.kinematics.diagnosis.rank import free_motions
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.kinematics.structure.degrees_of_freedom import account

@@ -7,12 +7,12 @@ import pytest
 from kincheck.adapters.shared.equivalents import in_own_frame, own_frame, with_joints_alone
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.outputs import with_all_coordinates
+from kincheck.core.extensions.laboratory.stress.reduction import reduce_case, round_geometry
 from kincheck.core.kinematics.formulation.constraints import frames, structure
 from kincheck.core.kinematics.formulation.parameters import placed, places
 from kincheck.core.kinematics.structure.components import components, describe_components
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.mechanism import Mechanism
-from kincheck.core.studies.stress.reduction import reduce_case, round_geometry
 
 from ..support.loaded_slider_crank import GRAVITY, loaded, pushed
 

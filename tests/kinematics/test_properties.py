@@ -14,10 +14,10 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from kincheck import adapters
 from kincheck.core import PointCoordinate
+from kincheck.core.extensions.laboratory.stress.families.base import bodies, swept
+from kincheck.core.extensions.laboratory.stress.families.loops import random_mechanism
+from kincheck.core.extensions.laboratory.stress.verdicts import with_numpy_executor
 from kincheck.core.mechanism.motions import Sine
-from kincheck.core.studies.stress.families.base import bodies, swept
-from kincheck.core.studies.stress.families.loops import random_mechanism
-from kincheck.core.studies.stress.verdicts import with_numpy_executor
 from scipy.spatial.transform import Rotation
 
 from ..support import mechanisms

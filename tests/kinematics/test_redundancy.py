@@ -8,6 +8,12 @@ import numpy as np
 import pytest
 from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, Revolute, solve, trace
 from kincheck.core.algebra import ZERO, Quat, vec
+from kincheck.core.extensions.laboratory.stress.families.linkages import (
+    add_loop,
+    any_plane,
+    crank_rocker,
+    four_bar,
+)
 from kincheck.core.kinematics.compiled.programs import Tracer
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
@@ -18,12 +24,6 @@ from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
 from kincheck.core.kinematics.structure.redundancy import independent_rows, reduce_rows
 from kincheck.core.primitives.base import Pose
 from kincheck.core.program import Elimination
-from kincheck.core.studies.stress.families.linkages import (
-    add_loop,
-    any_plane,
-    crank_rocker,
-    four_bar,
-)
 
 from ..support.mechanisms import Z, errors, planar_four_bar, solve_all
 

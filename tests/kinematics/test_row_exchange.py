@@ -10,6 +10,7 @@ from kincheck import cases
 from kincheck.cases import bennett
 from kincheck.cases.jet import Jet
 from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, Universal
+from kincheck.core.extensions.explain.conditioning import conditioning
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import SIGMA, Request
 from kincheck.core.kinematics.compiled.routes import Route
@@ -17,7 +18,6 @@ from kincheck.core.kinematics.continuation import segments, singular_samples
 from kincheck.core.kinematics.continuation.segments import Followed, choose_rows, with_better_rows
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import SideWalk, follow_samples
-from kincheck.core.kinematics.diagnosis.conditioning import conditioning
 from kincheck.core.kinematics.formulation.constraints import Style
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Path, Ramp, Sine

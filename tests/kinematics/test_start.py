@@ -24,15 +24,15 @@ from kincheck.core import (
 )
 from kincheck.core import solve_designs as designs
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.case.io.model_writer import way_to
+from kincheck.core.extensions.exports.model_writer import way_to
+from kincheck.core.extensions.proofs.verified_reference import prove_case
+from kincheck.core.extensions.sweep.sweep import sweep_designs
+from kincheck.core.extensions.sweep.variation_file import read_variation
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import start_of
 from kincheck.core.kinematics.formulation.constraints import Style
 from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
-from kincheck.core.studies.tolerance.sweep import sweep_designs
-from kincheck.core.studies.variation.variation_file import read_variation
-from kincheck.core.studies.verified_reference import prove_case
 
 from ..support.block_structures import solve_components, solve_sparse
 from ..support.mechanisms import X, chain, errors, slider_crank

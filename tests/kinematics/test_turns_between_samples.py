@@ -18,10 +18,10 @@ from kincheck.core import (
     Translational,
 )
 from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
+from kincheck.core.extensions.laboratory.bench.size import ring
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.kinematics.formulation.constraints import Style
-from kincheck.core.studies.bench.size import ring
 
 from ..support.mechanisms import ORIGIN, X, Y, Z, indexing, solve_all
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from kincheck.core.case.models.trees.assembly import Assembled
+from kincheck.core.extensions.trees.assembly import Assembled
 
 from .newton import least_squares
 

@@ -6,8 +6,8 @@ comes from the code under test. Every function takes complex numbers too, so tha
 taken along a path.
 
 Equation numbers are those of SAE 943745 as read in the formulation notes. The truth of the stress
-study (core/studies/truth) states the joints a second time: its rows and rates are derived by hand,
-those here follow from residuals alone, so that neither repeats a slip of the other.
+study (the laboratory's truth) states the joints a second time: its rows and rates are derived by
+hand, those here follow from residuals alone, so that neither repeats a slip of the other.
 """
 
 from dataclasses import dataclass

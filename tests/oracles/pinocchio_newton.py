@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import yaml
-from kincheck.core.case.models.trees.assembly import Assembled
+from kincheck.core.extensions.trees.assembly import Assembled
 
 from .newton import least_squares
 

@@ -20,10 +20,10 @@ import numpy as np
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load, read_tree
-from kincheck.core.case.models.trees import case as trees
-from kincheck.core.case.models.trees.assembly import Assembled
-from kincheck.core.case.models.trees.driving import Driving
 from kincheck.core.errors import KincheckError
+from kincheck.core.extensions.trees import case as trees
+from kincheck.core.extensions.trees.assembly import Assembled
+from kincheck.core.extensions.trees.driving import Driving
 from kincheck.core.kinematics import NativeSolver
 
 from .mujoco_newton import MujocoNewton

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from kincheck.core import primitives as p
 from kincheck.core.algebra import Quat, Vec3, cross
-from kincheck.core.primitives.dot12 import PaperDot12
-from kincheck.core.studies.paper.operations import (
+from kincheck.core.extensions.laboratory.paper.operations import (
     PrintedDot11,
     PrintedDot12,
     PrintedDot21,
@@ -15,6 +14,7 @@ from kincheck.core.studies.paper.operations import (
     conditions,
     skew,
 )
+from kincheck.core.primitives.dot12 import PaperDot12
 
 from ..oracles import naive
 from ..support.specimens import (

@@ -9,8 +9,8 @@ from time import sleep
 import numpy as np
 import pytest
 from kincheck.core import solve
-from kincheck.core.kinematics.blocks.component_lanes import ComponentLanes
-from kincheck.core.kinematics.blocks.sweep import BlockSweep
+from kincheck.core.extensions.blocks.component_lanes import ComponentLanes
+from kincheck.core.extensions.blocks.sweep import BlockSweep
 from kincheck.core.kinematics.compiled import compiled_model as models
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request

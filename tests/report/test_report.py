@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 from kincheck.core import solve
+from kincheck.core.extensions.laboratory.bench.size import ring
 from kincheck.core.harness.record import Results
 from kincheck.core.report import sections
 from kincheck.core.report.report import headline
 from kincheck.core.report.sections import split_message
-from kincheck.core.studies.bench.size import ring
 from msgspec.structs import replace
 
 from ..support.mechanisms import chain

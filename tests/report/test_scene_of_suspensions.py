@@ -9,7 +9,7 @@ import pytest
 from kincheck import cases, load
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.harness.record import Results
 from kincheck.core.harness.scene import LARGEST, POSES, scene, with_scenes
 from kincheck.core.report.axis import Axis, driver_axis

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 from kincheck.core import Body, Inline, JointAngle, Mechanism, Point, Revolute, Spherical
+from kincheck.core.extensions.laboratory.bench.size import LEAN, pivot
 from kincheck.core.kinematics import Method, NativeSolver
-from kincheck.core.studies.bench.size import LEAN, pivot
 
 
 def solve_as(method, mechanism, path, points=(), bodies=(), order=2, tol=1e-12, *, compiled=True):

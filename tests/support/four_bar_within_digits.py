@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 from kincheck.core.case.io.case_file import load_case
+from kincheck.core.extensions.laboratory.truth.forces import known_forces
+from kincheck.core.extensions.laboratory.truth.motion import follow_motion
 from kincheck.core.kinematics import solve
-from kincheck.core.studies.truth.forces import known_forces
-from kincheck.core.studies.truth.motion import follow_motion
 
 HINGES = {"a": (0.0, 0.0, 0.0), "b": (0.0, 0.0, 0.3), "c": (0.5, 0.0, 0.5), "d": (0.6, 0.0, 0.0)}
 BODIES = {"a": ("ground", "crank"), "b": ("crank", "coupler"), "c": ("coupler", "rocker")}

@@ -6,8 +6,8 @@ import zipfile
 from io import BytesIO
 
 from kincheck.core.case.io import case_file
-from kincheck.core.case.models.hardpoints.read import MOST_POINTS
-from kincheck.core.case.models.trees.tree import MOST_LINKS, MOST_MOVING
+from kincheck.core.extensions.hardpoints.read import MOST_POINTS
+from kincheck.core.extensions.trees.tree import MOST_LINKS, MOST_MOVING
 
 from ..fuzz.reference import PROVED
 from .case_texts import BASE, BY_FILE, edited

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from kincheck.adapters.native import Native
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.harness.compare import output_series
 
 from ..oracles.rods import Carrier, rotation

@@ -84,3 +84,14 @@ def folder_of(path: Path) -> str:
     if path == Path("core/__init__.py"):
         return "__init__"
     return "/".join(path.parts[1:-1]) or "."
+
+
+EXTENSIONS = frozenset(
+    path.parent for path in SOURCES if "\nEXTENSION = " in (ROOT / path).read_text(encoding="utf-8")
+)
+"""Folders of extensions."""
+
+
+def extension_of(path: Path) -> str | None:
+    """Return the extension that a file belongs to; None for the kernel."""
+    return next((folder.name for folder in path.parents if folder in EXTENSIONS), None)

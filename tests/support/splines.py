@@ -2,7 +2,7 @@
 
 import numpy as np
 from kincheck.core import Spline
-from kincheck.core.studies.truth.curves import Function
+from kincheck.core.extensions.laboratory.truth.curves import Function
 
 
 def through(points):

@@ -11,7 +11,7 @@ from kincheck import cases
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 
 STRUT = tomllib.loads((cases.FOLDER / "mcpherson_suspension.toml").read_text())
 AXES = {"convention": "iso8855", "forward": [1, 0, 0], "up": [0, 0, 1]}

@@ -3,7 +3,7 @@
 import json
 
 import numpy as np
-from kincheck.core.studies.variation.variation_file import read_variation
+from kincheck.core.extensions.sweep.variation_file import read_variation
 
 HEAD = {"schema": "kincheck-vary/1", "units": {"length": "mm", "angle": "deg"}}
 

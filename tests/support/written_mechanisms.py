@@ -20,8 +20,8 @@ from kincheck.core import (
     Universal,
 )
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.io.model_writer import way_to
 from kincheck.core.case.joint_probe import probes
+from kincheck.core.extensions.exports.model_writer import way_to
 
 from ..joints.test_planar_drive import ladder
 from ..oracles import naive

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...errors import CaseError, MechanismError, SolveError, unknown
+from ...extensions.hardpoints.suspension_section import read_suspension, suspension_lines
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
@@ -28,7 +29,6 @@ from .mechanism_sections import (
 from .outputs import output_lines, read_output, with_all_coordinates, with_slopes
 from .reference import read_reference, reason_against, reference_lines
 from .schema import SCHEMA, CaseKeys, ClosureKeys, ReferenceKeys, UnitsKeys
-from .suspension_section import read_suspension, suspension_lines
 
 LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.

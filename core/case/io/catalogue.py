@@ -12,6 +12,7 @@ from typing import Any, TypeAlias, TypeVar, cast
 import msgspec
 
 from ...errors import MechanismError
+from ...extensions.hardpoints.suspension import SuspensionOutput
 from ...joints import Coupler, Joint
 from ...mechanism.body import dimension_of
 from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper
@@ -19,7 +20,6 @@ from ...mechanism.motions import Motion
 from ..joint_probe import specimen
 from ..measures import Measure, key_of
 from ..quantity import own_keys
-from ..suspension import SuspensionOutput
 from .mechanism_sections import DRIVERS, RestingKeys, RigKeys
 from .schema import (
     COORDINATE,

@@ -12,6 +12,21 @@ from typing import Any
 import numpy as np
 
 from ...errors import CaseError
+from ...extensions.hardpoints.suspension import (
+    AxleOutput,
+    PerTravel,
+    Rate,
+    Side,
+    SuspensionOutput,
+    Vehicle,
+)
+from ...extensions.hardpoints.suspension.base import WheelOutput
+from ...extensions.hardpoints.suspension_section import (
+    SuspensionTable,
+    check_point,
+    direction,
+    wheels_of,
+)
 from ...mechanism.loads import Bushing, ForceElement, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
 from ..case import PER_TRAVEL, Case, Output, Quantity, pace, size
@@ -25,13 +40,10 @@ from ..measures import (
     key_of,
 )
 from ..quantity import AXES, own_keys, with_markers
-from ..suspension import AxleOutput, PerTravel, Rate, Side, SuspensionOutput, Vehicle
-from ..suspension.base import WheelOutput
 from ..units import Convert
 from .document import Section, explained, shown, toml_table
 from .reference_samples import RATES
 from .schema import COORDINATE, OutputKeys, ToleranceKeys, keys_of
-from .suspension_section import SuspensionTable, check_point, direction, wheels_of
 
 # Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized
 # mechanisms at 1e-16 m.

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import MOST_NAMED, brief, remedy, shortened
+from ...extensions.hardpoints.suspension import Convention, PerTravel, SuspensionOutput
 from ...trajectory import Array
 from ..case import TIME, Case, Origin, Quantity, Truth
-from ..suspension import Convention, PerTravel, SuspensionOutput
 from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
 from .document import fault, number_or_nan, require_known, shown
 from .reader_options import CurveOptions

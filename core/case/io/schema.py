@@ -189,6 +189,14 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args, get_type_hints
 import msgspec
 from msgspec import Meta
 
+from ...extensions.hardpoints.suspension import (
+    Axle,
+    AxleOutput,
+    Convention,
+    Reaction,
+    Side,
+    SuspensionOutput,
+)
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.body import ANGLE, SIX_NUMBERS, Inertia, dimension_of
 from ...mechanism.loads import Axes, Bushing, ForceElement, SpringDamper, dimensions_of
@@ -197,7 +205,6 @@ from ...mechanism.motions import Driver, Motion
 from ..case import TIME, Truth
 from ..measures import NAMES, Measure, key_of
 from ..quantity import own_keys
-from ..suspension import Axle, AxleOutput, Convention, Reaction, Side, SuspensionOutput
 
 SCHEMA = "kincheck-case/1"
 SCHEMA_FILE = "kincheck-case.schema.json"

@@ -15,9 +15,9 @@ from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_SEVERAL, WITHOUT, Sup
 from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
-    from .hardpoints.table import HardpointTable
-    from .trees.element import Element
-    from .trees.tree import Tree
+    from ...extensions.hardpoints.table import HardpointTable
+    from ...extensions.trees.element import Element
+    from ...extensions.trees.tree import Tree
 
 CASE, CHRONO, ADAMS, ASSETTO, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
     "case file",
@@ -105,16 +105,16 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             "found a file name with control characters, expected printable ones; rename the file",
         )
     if kind == DATASET:
-        from .adams.read import read_adams
+        from ...extensions.adams.read import read_adams
 
         return read_adams(file, _text(file, of_spreadsheet=True), supplied)
     if kind == MODEL:
-        from .trees.case import case_of
+        from ...extensions.trees.case import case_of
 
         tree = read_tree(file, supplied.without)
         require_used(file, supplied.without, tree.without)
         return case_of(tree, supplied)
-    from .hardpoints.read import case_of_hardpoints
+    from ...extensions.hardpoints.read import case_of_hardpoints
 
     return case_of_hardpoints(_hardpoints(file, kind, supplied), supplied)
 
@@ -147,22 +147,22 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
     root = root_of(file)
     match root.tag:
         case "robot":
-            from .trees.urdf import read_urdf as read
+            from ...extensions.trees.urdf import read_urdf as read
         case "sdf":
-            from .trees.sdf import read_sdf as read
-            from .trees.sdf import whole_sdf
+            from ...extensions.trees.sdf import read_sdf as read
+            from ...extensions.trees.sdf import whole_sdf
 
             root = whole_sdf(root)
         case "OpenSimDocument":
-            from .trees.osim import read_osim as read
-            from .trees.osim import whole_osim
+            from ...extensions.trees.osim import read_osim as read
+            from ...extensions.trees.osim import whole_osim
 
             root = whole_osim(root)
         case "usd":
-            from .trees.usd import read_usd as read
+            from ...extensions.trees.usd import read_usd as read
         case _:
-            from .trees.mjcf import read_mjcf as read
-            from .trees.mjcf import whole_mjcf
+            from ...extensions.trees.mjcf import read_mjcf as read
+            from ...extensions.trees.mjcf import whole_mjcf
 
             root = whole_mjcf(root)
     omitted: list[tuple[str, Element]] = []
@@ -195,19 +195,19 @@ def root_of(file: Path) -> Element:
         KincheckError: usd-core is not installed.
     """
     if file.suffix.lower() in STAGES:
-        from .trees.usd_stage import root_of_usd
+        from ...extensions.trees.usd_stage import root_of_usd
 
         return root_of_usd(file)
-    from .trees.element import parse_xml
+    from ...extensions.trees.element import parse_xml
 
     return parse_xml(file, _text(file))
 
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     """Return the table of hardpoints of a file."""
-    from .hardpoints.programs import read_adams, read_assetto, read_chrono
-    from .hardpoints.rows import read_plain, read_spreadsheet
-    from .hardpoints.tree import read_python, read_tree
+    from ...extensions.hardpoints.programs import read_adams, read_assetto, read_chrono
+    from ...extensions.hardpoints.rows import read_plain, read_spreadsheet
+    from ...extensions.hardpoints.tree import read_python, read_tree
 
     if kind == WORKBOOK:
         return read_spreadsheet(file, supplied)
@@ -235,7 +235,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
         return _kind_of_json(file, supplied)
     if suffix in _KINDS:
         return _KINDS[suffix]
-    from .hardpoints.programs import is_assetto
+    from ...extensions.hardpoints.programs import is_assetto
 
     text = _text(file, of_spreadsheet=True)
     if "[HARDPOINT]" in text:
@@ -254,14 +254,14 @@ def _kind_of_toml(file: Path) -> str:
     text = _text(file)
     if _OF_CASE.search(text):
         return CASE
-    from .hardpoints.tree import has_points, toml_tree
+    from ...extensions.hardpoints.tree import has_points, toml_tree
 
     return TREE if has_points(toml_tree(file, text)) else CASE
 
 
 def _kind_of_json(file: Path, supplied: Supplied) -> str:
-    from .hardpoints.programs import is_chrono, without_comments
-    from .hardpoints.tree import has_points, json_tree
+    from ...extensions.hardpoints.programs import is_chrono, without_comments
+    from ...extensions.hardpoints.tree import has_points, json_tree
 
     text = without_comments(_text(file))
     if text.lstrip().startswith("["):

@@ -1,1 +1,5 @@
 """kincheck bisect: the release of a simulator that changed a result, the term, and who is right."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(__name__, commands={"bisect": "command:Bisect"})

@@ -1,1 +1,0 @@
-"""Datasets of Adams Solver (.adm), read into cases."""

@@ -1,0 +1,5 @@
+"""Datasets of Adams Solver (.adm), read into cases."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(__name__, needs=["explain"])

@@ -1,0 +1,14 @@
+"""All ways to assemble a mechanism: which the start's numbers do not tell."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(
+    __name__,
+    needs=["exports"],
+    commands={"assemblies": "command:ListAssemblies"},
+    public={
+        "Assemblies": "assembly_modes:Assemblies",
+        "Assembly": "assembly_modes:Assembly",
+        "find_assemblies": "assembly_modes:find_assemblies",
+    },
+)

@@ -1,0 +1,7 @@
+"""A mechanism as a list of blocks that are solved one after the other: components with compiled
+programs, or one sparse system; both are followed by one walk.
+"""
+
+from ...doors import Extension
+
+EXTENSION = Extension(__name__)

@@ -1,0 +1,10 @@
+"""The board: how well time steppers hold the free motion of closed loops."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(
+    __name__,
+    needs=["free"],
+    commands={"board": "command:CompareSteppers"},
+    schemas={"board": "results:Board"},
+)

@@ -1,0 +1,7 @@
+"""Two designs beside each other: what changes in their outputs."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(
+    __name__, commands={"compare": "command:Compare"}, public={"compare": "command:Compare"}
+)

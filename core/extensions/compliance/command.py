@@ -1,0 +1,276 @@
+"""kincheck kc: kinematics and compliance of a suspension on its bushings."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...case.io.reader_options import HARDPOINTS, Supplied
+from ...cli import shared_options
+from ...cli.registry import Registry, Status
+from ...cli.shared_options import TOL, Isolated
+from ...errors import KincheckError, refuse
+from ...options import (
+    argument,
+    destination,
+    group,
+    joint_types,
+    option,
+    options,
+    several,
+    with_values,
+)
+
+if TYPE_CHECKING:
+    from ...case.case import Case
+    from ...case.units import Unit
+    from ...harness.engine import Engine
+    from ...harness.record import Record, Results
+    from .study import ComplianceResults
+
+MOST, UNLESS_GIVEN = 100_000, "25"
+
+
+@dataclass(frozen=True)
+class FromDesign(Supplied):
+    """Options of the readers; the travel counts from design, of any file."""
+
+    travel: str | None = option(
+        "travel of the wheel from design, or of the steering with --axle steer: N samples, default"
+        " 25, from A to B: --travel=-60mm:60mm:25, which is the default; one number is one sample;"
+        " in metres without a unit",
+        metavar="A:B[:N]",
+        heading=HARDPOINTS,
+    )
+
+
+@options
+class MeasureCompliance(Isolated):
+    """Find the equilibria of a suspension with springs, bushings and loads, and their compliance.
+
+    Joints with bushings give way to them. --axle heave, roll or steer moves both wheels of an axle.
+
+    Exit status: 0 all samples have an equilibrium, and all engines agree; 1 an engine deviates or
+    ends in an error; 2 a sample has no equilibrium, and its message gives the last load that has
+    one, or the tool could not do its work.
+    """
+
+    about = "kinematics and compliance: equilibria on bushings over travel and loads"
+    case: str = argument(
+        "name of a built-in case, or path to a case file or a hardpoint table", "CASE"
+    )
+    load: tuple[str, ...] = option(
+        "curve over a load at design, as lateral=-3000:3000:31 [N, N m]: longitudinal, lateral,"
+        " braking or aligning; 25 samples unless given; one number is a load that acts over all"
+        " travel; may be repeated",
+        metavar="NAME=A:B:N",
+        several="repeated",
+    )
+    bushings: Path | None = option(
+        "bushings of the joints, in SI: TOML, for a table of hardpoints by role,"
+        " [bushings.ROLE], as kincheck templates NAME --bushings prints; else tables"
+        " [joints.NAME.bushings.X] as in case files",
+        Path,
+        "FILE",
+    )
+    engine: tuple[str, ...] = option(
+        "check the equilibria by these engines: each finds them by its own kinematics, gravity"
+        " and rows, exudyn-static by its own solver, and gets a verdict against native",
+        metavar="NAME",
+        several="together",
+    )
+    history: Path | None = destination(
+        "store the records of native and of these engines in this file, as kincheck run does", Path
+    )
+    csv: Path | None = destination("write the curves, in mm, deg, N, kN", Path)
+    json: str | None = destination("write the results in SI; - for standard output")
+    out: Path | None = destination("write the page DIR/kc.html, and results.json", Path, "DIR")
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: FromDesign = group(default_factory=FromDesign)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ...case.io.atomic_files import write
+        from ...case.models.files import is_table
+        from ...case.units import LENGTHS
+        from ...harness.engine import STANDARD
+        from ...harness.record import to_json
+        from ...report.progress import complain, missing_requirements
+        from ...report.table import print_table
+        from ...report.terminal import with_json
+        from . import study, views
+
+        problems = shared_options.contradictions(self)
+        engines = self._engines(registry, problems)
+        refuse(problems or shared_options.unreachable(self))
+        typed, axle = self.supplied.travel, self.supplied.axle
+        travel = None if typed is None else _values("--travel", typed, LENGTHS)
+        table = os.path.isfile(self.case) and is_table(Path(self.case))
+        # the sweep of a table's case; one sample is none
+        swept = table and travel is not None and travel[0] != travel[-1]
+        supplied = replace(
+            self.supplied,
+            travel=f"{travel[0]}:{travel[-1]}:{len(travel)}" if travel and swept else None,
+            axle=axle if table else None,
+            bushings=self.bushings if table else None,
+        )
+        case = registry.case_of(with_values(self, supplied=supplied), driven=False)
+        if self.bushings is not None and not table:
+            from ...case.io.mechanism_sections import with_bushings
+
+            case = with_bushings(case, self.bushings)
+        refuse(self.unwritable("kc.html", *(["results.json"] if engines else [])))
+        loads = dict(map(_load, self.load))
+        results = study.compliance(case, travel, loads, axle or study.AxleMotion.HEAVE)
+        if self.csv is not None:
+            write("--csv", self.csv, views.table(results).encode())
+        if engines:
+            results = replace(
+                results, checked=self._check_engines(engines, results.cases, problems)
+            )
+        checked = results.checked
+        if self.out is not None:
+            if checked is not None:
+                write("--out", self.out / "results.json", to_json(checked))
+            write("--out", self.out / "kc.html", views.page(results).encode())
+        with with_json(views.as_data(results), self.json) as console:
+            print(*views.lines(results), sep="\n", file=console.file)
+            if checked is not None:
+                print_table(checked, console.file, reactions=True)
+            complain(f"note: {note}" for note in (*case.assembly, *results.travel.notes))
+        named = [each.name for each in engines if each.name != STANDARD]
+        problems += views.failures(results)
+        problems += missing_requirements(checked, (), named) if checked else []
+        refuse(problems)
+        return Status.of(checked) if checked is not None else Status.WITHIN
+
+    def _engines(self, registry: Registry, problems: list[str]) -> list[Engine]:
+        """Return native and the named engines; none if nothing is to be checked or stored."""
+        found = registry.find_engines(self.engine, problems)
+        if not (self.engine or self.history):
+            return []
+        native = registry.baseline(found)
+        return [native, *found] if native is not None else found
+
+    def _check_engines(
+        self,
+        engines: Sequence[Engine],
+        cases: Sequence[Case],
+        problems: list[str],
+    ) -> Results:
+        """Return the records of the engines, stored in the history if there is one."""
+        from ...harness import run as running
+        from ...history.runs import keep
+        from ...history.store import HistoryError
+
+        solver, settings = shared_options.solver(self, engines)
+        keeping = None
+        if self.history is not None:
+            settings["selection"] = {
+                "cases": [each.name for each in cases],
+                "engines": [each.name for each in engines],
+                "options": {},
+            }
+            try:
+                keeping = keep(
+                    self.history,
+                    cases,
+                    engines,
+                    tol=TOL,
+                    command=self.command,
+                    settings=settings,
+                    resume=False,
+                )
+            except HistoryError as error:
+                problems.append(f"{error}; the run is not in the history")
+
+        def add(record: Record, done: int, total: int) -> None:
+            if keeping is not None:
+                keeping.add(record)
+
+        facts = keeping.facts if keeping is not None else settings
+        results = running.run(
+            cases, engines, tol=TOL, progress=add, command=self.command, solver=solver, facts=facts
+        )
+        if keeping is not None:
+            keeping.end(results, interrupted=False)
+            problems += keeping.problems + keeping.store.damage
+        return results
+
+
+def _load(text: str) -> tuple[str, Any]:
+    from ...case.units import FORCES, TORQUES
+
+    name, _, values = text.partition("=")
+    if not values:
+        raise KincheckError(f"--load {text}: expected NAME=A:B:N, as lateral=-3000:3000:31")
+    units = TORQUES if name == "aligning" else FORCES
+    found = _values(f"--load {name}", values, units)
+    return name, found if ":" in values else found[0]
+
+
+def _values(option: str, text: str, units: Mapping[str, Unit]) -> list[float]:
+    """Return the samples A:B:N, or one number, in SI."""
+    from ...case.io.document import interval
+
+    parts = text.split(":")
+    bare, other = [*units][:2]
+    count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else UNLESS_GIVEN
+    if len(parts) == 2 and option == "--travel" and parts[1].isdecimal() and text[0] != "-":
+        count = ""  # as run has it, up and down
+    try:
+        ends, _ = interval(parts[:2], units, bare)
+    except ValueError:
+        ends = [math.nan]
+    if not all(map(math.isfinite, ends)) or not count.isdecimal() or not 1 <= int(count) <= MOST:
+        raise KincheckError(
+            f"{option} {text}: expected START:STOP:SAMPLES or START:STOP, numbers in"
+            f" {' or '.join(units)}, {bare} without a unit, and 1 to {MOST} samples; write"
+            f" -60{other}:60{other}:25"
+        )
+    start, stop, steps = ends[0], ends[-1], max(1, int(count) - 1)
+    return [start + (stop - start) * (k / steps) for k in range(int(count))]
+
+
+def compliance(
+    case: str | Path | Case,
+    travel: Sequence[float] | None = None,
+    loads: Mapping[str, float | Sequence[float]] | None = None,
+    axle: str = "heave",
+    *,
+    engines: str | Engine | Sequence[str | Engine] = (),
+    jobs: int | None = None,
+) -> ComplianceResults:
+    """Return the kinematics and compliance of a suspension, as the command `kincheck kc` does.
+
+    Args:
+        case: name, path or case.
+        travel: of the wheel from design [m], by default 60 mm up and down; of the steering if
+            `axle` is "steer".
+        loads: values by load, "lateral", "longitudinal", "braking" or "aligning" [N, N m], each
+            applied at design; one number acts over all travel.
+        axle: motion of both wheels: "heave", "roll" or "steer".
+        engines: names or engines that find the equilibria by themselves; `checked` has their
+            records, judged against native.
+        jobs: number of worker processes, as of `run`.
+
+    Raises:
+        KincheckError: the case lacks facts, or a sample has no equilibrium; the message gives the
+            last load with one.
+    """
+    from ...cli.main import function, registry
+    from ...cli.run import Run
+    from . import study
+
+    one = registry().find_case(case, driven=False)
+    found = study.compliance(one, travel, loads, axle)
+    if found.failures:
+        raise KincheckError("\n".join(found.failures))
+    if not (team := several(engines)):
+        return found
+    run = function("run", Run)
+    return replace(found, checked=run(found.cases, ("native", *team), jobs=jobs))

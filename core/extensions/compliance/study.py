@@ -1,0 +1,475 @@
+"""Kinematics and compliance (K&C) of a suspension: equilibria over travel, and over loads.
+
+At each travel the wheel's height is held, and the rest is in equilibrium with springs, bushings,
+weight and loads. The 6 x 6 matrix C gives displacement (3) and turn (3) of the carrier at the
+contact, global axes, by force (3) and torque (3) there; of an axle it is 12 x 12, left wheel first.
+Slopes of outputs by a load follow from C's motions as slopes by travel do from velocities.
+
+Sources: the numbering and the factors are those of Adams/Car, Output of Suspension Analyses
+(adams.thisaray.com/adams_car/turn.html), and of MotionView, Suspension Design Factors
+(help.altair.com/hwdesktop/hwx/topics/motionview/suspension_design_factors_r.htm).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...case.case import TIME, Balance, Case, Load, Rig, Sweep, Truth
+from ...case.measures import DriverEffort
+from ...case.quantity import ORDERS, Output, Quantity, point_jets, still_jets, with_markers
+from ...errors import KincheckError, SolveError, number_of, shortened
+from ...harness.record import Results
+from ...jet import Jet
+from ...kinematics import Equilibria, StaticModel, solve
+from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Motion, Ramp
+from ...trajectory import Array, PointMotion
+from ..hardpoints.suspension import PerTravel
+from .rig import CONTACT, PER, Wheel, held_drivers, wheels_of
+
+# Engines agree on equilibria to round-off of their positions, which stiffness turns into forces.
+WITHIN, SAME_LOAD, ROUND_OFF = 1e-12, 1e-9, 1e-15
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+GOAL = "engines differ by round-off"
+DEFAULT_TRAVEL = np.linspace(-0.06, 0.06, 25)
+MOST_SAID = 5
+"""Failures and outputs that messages name."""
+
+
+class AxleMotion(StrEnum):
+    """Motion of both wheels of an axle over the travel: alike, against each other, or the heights
+    held while the swept driver steers.
+    """
+
+    HEAVE = "heave"
+    ROLL = "roll"
+    STEER = "steer"
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A quantity over the samples [SI], shape (n,); NaN without an equilibrium."""
+
+    values: Array
+    unit: str
+    sense: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class ComplianceCurves:
+    """Results over travel, or over a load at design.
+
+    Attributes:
+        axis: name of the varied quantity: "travel", or a load.
+        at: its values [m, N or N m], shape (n,).
+        wheel_center, spin_axis: of the (left) wheel, global [m, -], shape (n, 3).
+        wheel_load: upward force to hold its centre's height [N], shape (n,).
+        compliance: C, shape (n, 6, 6) or (n, 12, 12).
+        outputs: outputs and their slopes by name.
+        rigid: outputs of the mechanism with joints in place of bushings, over travel.
+        failures: samples without equilibrium, and the last ones with it.
+        notes: facts for readers.
+        turning: whether the travel is an angle.
+    """
+
+    axis: str
+    at: Array
+    wheel_center: Array
+    spin_axis: Array
+    wheel_load: Array
+    compliance: Array
+    outputs: Mapping[str, Curve]
+    rigid: Mapping[str, Array]
+    failures: tuple[str, ...]
+    notes: tuple[str, ...]
+    turning: bool = False
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComplianceResults:
+    """Results of a study: over travel, and over each load at design by its name.
+
+    Attributes:
+        cases: the same equilibria for engines, in the same order.
+        checked: records of engines.
+    """
+
+    case: str
+    travel: ComplianceCurves
+    loads: Mapping[Load, ComplianceCurves] = field(default_factory=dict[Load, ComplianceCurves])
+    signs: str = ""
+    cases: tuple[Case, ...] = ()
+    checked: Results | None = None
+
+    def __repr__(self) -> str:
+        found = number_of(len(self.travel.at), "sample")
+        lost = f", {len(self.failures)} without equilibrium" if self.failures else ""
+        return f"<ComplianceResults: {self.case}, {found} of travel{lost}>"
+
+    @property
+    def failures(self) -> list[str]:
+        """All samples without equilibrium."""
+        every = (self.travel, *self.loads.values())
+        return [message for each in every for message in each.failures]
+
+
+def compliance(
+    case: Case,
+    travel: Array | Sequence[float] | None = None,
+    loads: Mapping[str, float | Sequence[float] | Array] | None = None,
+    axle: str = AxleMotion.HEAVE,
+) -> ComplianceResults:
+    """Return the kinematics and compliance of a suspension.
+
+    Joints with bushings give way to them. Drivers of [compliance] `held` keep their values, by
+    default all.
+
+    Args:
+        travel: of the wheel, or of the steering if `axle` is "steer" [m or rad], from design; by
+            default 60 mm up and down.
+        loads: values by load, "lateral", "longitudinal", "braking" or "aligning" [N, N m], each
+            applied at design; one number is applied over all travel.
+        axle: motion of both wheels, if the case has two: "heave", "roll" or "steer".
+
+    Returns:
+        The curves; samples without an equilibrium are NaN, and `failures` has the last reachable
+        loads.
+
+    Raises:
+        KincheckError: the case does not tell wheel, contact or height, or a load is unknown.
+        SolveError: a body is free, or there is no equilibrium at rest.
+    """
+    study = _Study(case, AxleMotion(axle))
+    given = DEFAULT_TRAVEL if travel is None else np.asarray(travel, dtype=np.float64)
+    for name in loads or {}:
+        if name not in list(Load):
+            raise KincheckError(f"load {name!r} is none of {', '.join(Load)}; give one of these")
+    every = {Load(name): np.asarray(values, float) for name, values in (loads or {}).items()}
+    always = {load: values for load, values in every.items() if not values.ndim}
+    curves = {load: study.over_load(load, values) for load, values in every.items() if values.ndim}
+    over_travel = study.over_travel(given, always)
+    cases = [study.case_of("travel", given, always, over_travel)]
+    cases += [study.case_of(x, curve.at, {x: curve.at}, curve) for x, curve in curves.items()]
+    return ComplianceResults(case.name, over_travel, curves, study.signs, tuple(cases))
+
+
+def _load_text(load: Load, value: float) -> str:
+    return f"{load} {value:.6g} {'N m' if load is Load.ALIGNING else 'N'}"
+
+
+class _Study:
+    def __init__(self, case: Case, axle: AxleMotion) -> None:
+        self.case, self.axle, self.rig = case, axle, case.rig or Rig()
+        self.lacking = [x for x in case.outputs if not x.forces and x.orders < ORDERS - 1]
+        soft = case.mechanism.released()
+        held = held_drivers(case, self.rig, soft)
+        self.wheels = wheels_of(case, held, soft)
+        if len(self.wheels) == 1 and axle is not AxleMotion.HEAVE:
+            raise KincheckError(
+                f"{case.name}: --axle {axle} needs both wheels of an axle, and the case has one;"
+                " add [suspension.other], or leave the option out"
+            )
+        self.steering = _steering(case, held, self.wheels) if axle is AxleMotion.STEER else ""
+        self.mechanism: Mechanism = replace(
+            soft, drivers=[driver for driver in soft.drivers if driver.name in held]
+        )
+        self.model = StaticModel(
+            self.mechanism, [point for wheel in self.wheels for point in wheel.points]
+        )
+
+    @property
+    def signs(self) -> str:
+        """The convention of signs, in words."""
+        vehicle = self.wheels[0].vehicle
+        return "global axes of the case" if vehicle is None else vehicle.signs
+
+    @property
+    def _other(self) -> float:
+        """The sense of the other wheel's travel and loads."""
+        return -1.0 if self.axle is AxleMotion.ROLL else 1.0
+
+    def _travels(self, values: Array) -> dict[str, Array]:
+        if self.steering:
+            return {self.steering: values}
+        signs = (1.0, self._other)
+        return {w.travel: s * values for w, s in zip(self.wheels, signs, strict=False)}
+
+    def over_travel(self, values: Array, loads: Mapping[Load, Array]) -> ComplianceCurves:
+        """Return the curves over travel, with constant loads."""
+        constant = {load: np.full(len(values), float(x)) for load, x in loads.items()}
+        found = self.model.solve(self._loads(constant, len(values)), self._travels(values))
+        what = self.steering or "travel"
+        unit = "m"
+        if self.steering and self.mechanism.driver(self.steering).turns:
+            unit = "rad"
+
+        def sample_text(x: float, share: float) -> str:
+            under = [_load_text(load, share * float(value)) for load, value in loads.items()]
+            return " with ".join([f"{what} {share * x:.6g} {unit}", *under])
+
+        curves = self._curves("travel", values, found, sample_text)
+        return replace(curves, rigid=self._rigid(values), turning=unit == "rad")
+
+    def case_of(
+        self, axis: str, at: Array, loads: Mapping[Load, Array], found: ComplianceCurves
+    ) -> Case:
+        """Return the equilibria of these samples as a case for engines.
+
+        Its outputs are the wheels' centres and loads, and those of the case that are poses.
+        """
+        n = len(at)
+        given = self._loads({load: np.broadcast_to(x, (n,)) for load, x in loads.items()}, n)
+        places = tuple(point for wheel in self.wheels for point in wheel.points)
+        largest = max(np.nanmax(np.abs([found.wheel_load, *(x[:, 2] for x in given.values())])), 0)
+        stiff = max((x for each in self.mechanism.forces for x in _stiffnesses(each)), default=0.0)
+        outputs: list[Quantity] = []
+        for wheel in self.wheels:
+            outputs += [
+                Output(
+                    f"{wheel.name}wheel_center_{name}", wheel.point, axis, False, WITHIN, 0.0, GOAL
+                )
+                for name, axis in AXES.items()
+            ]
+            load = SAME_LOAD * float(largest) + ROUND_OFF * stiff
+            effort = DriverEffort(f"{wheel.name}wheel_load", load, 0.0, GOAL, driver=wheel.travel)
+            outputs.append(effort.bound(self.mechanism))
+        known = [x for x in self.case.outputs if not x.forces and x.orders == ORDERS]
+        sweep = Sweep(TIME, np.arange(n, dtype=np.float64), 0.0)
+        if axis == "travel":
+            (first, _), *others = self._travels(np.ones(n)).items()
+            motions = {name: Ramp(float(x[0])) for name, x in others}
+            sweep = Sweep(first, at, 0.0, motions=motions)
+        return replace(
+            self.case,
+            name=f"{self.case.name} over {axis}",
+            truth=Truth.CONSENSUS_ONLY,
+            mechanism=with_markers(self.mechanism, outputs),
+            sweep=sweep,
+            outputs=tuple(outputs + known),
+            reference={},
+            balance=Balance(places, given),
+        )
+
+    def over_load(self, load: Load, values: Array) -> ComplianceCurves:
+        """Return the curves over a load at design."""
+        found = self.model.solve(self._loads({load: values}, len(values)), {})
+        return self._curves(load, values, found, lambda x, share: _load_text(load, share * x))
+
+    def _loads(self, loads: Mapping[Load, Array], n: int) -> dict[str, Array]:
+        found = {point.name: np.zeros((n, 6)) for wheel in self.wheels for point in wheel.points}
+        for load, values in loads.items():
+            for wheel, sign in zip(self.wheels, (1.0, self._other), strict=False):
+                place, unit = wheel.unit(load)
+                found[place] += sign * values[:, None] * unit
+        return found
+
+    def _curves(
+        self, axis: str, at: Array, found: Equilibria, what: Callable[[float, float], str]
+    ) -> ComplianceCurves:
+        wheel, lost = self.wheels[0], ~found.reached
+        outputs = self._outputs(found) | self._rates(found)
+
+        def blank(values: Array) -> Array:
+            return _blank_rows(values, lost)
+
+        failures = [
+            f"no equilibrium at {what(float(at[k]), 1.0)}: the last is at"
+            f" {what(float(at[k]), float(found.share[k]))}, where the path turns back"
+            " (snap-through) or meets another one"
+            for k in np.flatnonzero(lost)
+        ]
+        unstable = [
+            f"the equilibrium at {what(float(x), 1.0)} is unstable: {way}"
+            for x, way, ok in zip(at, found.unstable, found.reached, strict=True)
+            if way and ok
+        ]
+        notes = [f"{unstable[0]}; {len(unstable)} samples in all"] if unstable else []
+        if self.lacking:
+            listed = shortened([output.name for output in self.lacking], MOST_SAID)
+            notes.append(
+                f"not computed: {listed}: slopes of slopes, or with the other wheel held; kincheck"
+                " run has them for rigid joints"
+            )
+        if not self.mechanism.forces:
+            notes.append(
+                "nothing is elastic: there is no bushing and no spring, so nothing gives way to a"
+                " load; give [joints.NAME.bushings.X], or --bushings FILE"
+            )
+        if self.model.equations.dropped:
+            notes.append(
+                f"{len(self.model.equations.dropped)} redundant rows are left out: displacements"
+                " are unique, reactions of these joints are not"
+            )
+        return ComplianceCurves(
+            axis,
+            at,
+            blank(found.place(wheel.body, wheel.center)),
+            blank(found.direction(wheel.body, wheel.spin)),
+            blank(found.efforts[wheel.travel]),
+            blank(self._matrix(found)),
+            {name: replace(x, values=blank(x.values)) for name, x in outputs.items()},
+            {},
+            tuple(failures),
+            tuple(notes),
+        )
+
+    def _matrix(self, found: Equilibria) -> Array:
+        """Return C at the contacts, shape (n, 6 wheels, 6 wheels)."""
+        return np.concatenate(
+            [
+                np.concatenate(
+                    [
+                        found.motion(
+                            found.by_load[f"{loaded.name}{CONTACT}"][0], seen.body, seen.contact
+                        )
+                        for seen in self.wheels
+                    ],
+                    axis=1,
+                )
+                for loaded in self.wheels
+            ],
+            axis=2,
+        )
+
+    def _step(self, found: Equilibria, load: Load) -> Array:
+        """Return the motion of the unknowns by a unit of a load on all wheels."""
+        total = 0.0
+        for wheel, sign in zip(self.wheels, (1.0, self._other), strict=False):
+            place, unit = wheel.unit(load)
+            total = total + sign * (found.by_load[place][0] @ unit)
+        return np.asarray(total)
+
+    def _outputs(self, found: Equilibria) -> dict[str, Curve]:
+        by_travel = sum(
+            (
+                sign * found.by_driver[wheel.travel][0]
+                for wheel, sign in zip(self.wheels, (1.0, self._other), strict=False)
+            ),
+            np.zeros(()),
+        )
+        by_load = {load: self._step(found, load) for load in self.rig.loads}
+        curves = dict[str, Curve]()
+        for output in self.case.outputs:
+            if output.forces or output in self.lacking:
+                continue
+            value = self._value(output, found, np.asarray(by_travel))
+            curves[output.name] = Curve(value.x, output.unit, output.sense)
+            if isinstance(output, PerTravel) or output.orders < ORDERS:
+                continue
+            for load, step in by_load.items():
+                per = "N m" if load is Load.ALIGNING else "N"
+                slope = self._value(output, found, step).v
+                unit = f"{output.unit}/{f'({per})' if ' ' in per else per}"
+                sense = f"{output.sense}, per unit of {load} load".removeprefix(", ")
+                curves[f"{output.name}{PER[load]}"] = Curve(slope, unit, sense)
+        return curves
+
+    def _value(self, output: Quantity, found: Equilibria, step: Array) -> Jet:
+        """Return an output, with its slope by a motion of the unknowns in place of its rate."""
+
+        def at(name: str) -> tuple[Array, Array]:
+            point = self.mechanism.point(name)
+            moved = found.motion(step, point.body, point.position)
+            return found.place(point.body, point.position), moved
+
+        return self._output(output, at, len(found.share))
+
+    def _output(self, output: Quantity, at: Callable[[str], tuple[Array, Array]], n: int) -> Jet:
+        """Return an output of n samples by places of points and their rates, shape (n, 3)."""
+        moving = {name: point_jets(PointMotion(*at(name), None)) for name in output.points}
+        design = {name: still_jets(self.mechanism.point(name).position) for name in output.points}
+        jet = output.of(moving, design)
+        x, v, a = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (jet.x, jet.v, jet.a))
+        return Jet(x, v, a)
+
+    def _rates(self, found: Equilibria) -> dict[str, Curve]:
+        """Return wheel rates, and roll stiffness; see the documentation for definitions."""
+        first = self.wheels[0]
+        order = list(self.model.drivers)
+        own = found.by_driver[first.travel][1][:, order.index(first.travel)]
+        rates = {
+            "wheel_rate": Curve(own, "N/m", "upward force per upward travel of the wheel's centre")
+        }
+        y = abs(float(np.array(first.axes[1]) @ (np.array(first.center) - self._middle(first))))
+        opposite = own
+        if len(self.wheels) == 2:
+            across = found.by_driver[self.wheels[1].travel][1][:, order.index(first.travel)]
+            opposite = own - across
+            rates["wheel_rate"] = replace(rates["wheel_rate"], values=own + across)
+            rates["wheel_rate_opposite"] = Curve(opposite, "N/m", "both wheels against each other")
+            rates["anti_roll_share"] = Curve(
+                -2.0 * across / opposite, "1", "part of the roll stiffness that couples both wheels"
+            )
+        if y:
+            rates["roll_stiffness"] = Curve(
+                2.0 * y * y * opposite, "N m/rad", "torque per roll angle of both wheels' centres"
+            )
+        if (tire := self.rig.tire_stiffness) is not None:
+
+            def series(k: Array) -> Array:
+                return k * tire / (k + tire)
+
+            rates["ride_rate"] = Curve(
+                series(rates["wheel_rate"].values), "N/m", "wheel rate in series with the tire's"
+            )
+            if y:
+                rates["roll_rate"] = Curve(
+                    2.0 * y * y * series(opposite), "N m/rad", "roll stiffness with the tires'"
+                )
+        return rates
+
+    def _middle(self, wheel: Wheel) -> Array:
+        return np.array((0.0, 0.0, 0.0) if wheel.vehicle is None else wheel.vehicle.middle)
+
+    def _rigid(self, values: Array) -> dict[str, Array]:
+        """Return the outputs of the mechanism with its joints; none if it cannot move so."""
+        mechanism = self.case.mechanism
+        travels = self._travels(values)
+        driver, given = next(iter(travels.items()))
+        others: dict[str, Motion] = {}
+        if len(travels) == 2:
+            others = {[*travels][1]: Ramp(self._other)}
+        try:
+            moved = solve(
+                mechanism, driver, given + mechanism.design_value(driver), order=1, motions=others
+            )
+        except SolveError:  # it has other freedoms, and no rigid curve to compare with
+            return {}
+
+        def at(name: str) -> tuple[Array, Array]:
+            motion = moved.points[name]
+            rate = motion.velocity if motion.velocity is not None else motion.position * np.nan
+            return motion.position, rate
+
+        return {
+            output.name: np.where(moved.solved, self._output(output, at, len(values)).x, np.nan)
+            for output in self.case.outputs
+            if not output.forces and output not in self.lacking
+        }
+
+
+def _stiffnesses(each: Any) -> Sequence[float]:
+    return np.atleast_1d(getattr(each, "stiffness", 0.0)).tolist()
+
+
+def _steering(case: Case, held: Sequence[str], wheels: Sequence[Wheel]) -> str:
+    lifting = {wheel.travel for wheel in wheels}
+    others = [name for name in held if name not in lifting]
+    if not others:
+        raise KincheckError(
+            f"{case.name}: --axle steer needs a held driver of the steering, and all held drivers"
+            " lift wheels; add one to the case"
+        )
+    return case.sweep.driver if case.sweep.driver in others else others[0]
+
+
+def _blank_rows(values: Array, lost: NDArray[np.bool_]) -> Array:
+    found = np.array(values, dtype=np.float64)
+    found[lost] = np.nan
+    return found

@@ -1,0 +1,112 @@
+"""The command kincheck export."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...case.io.escape import file_name
+from ...cli.registry import Registry, Status
+from ...cli.shared_options import OfCase, driver_value
+from ...doors import offers
+from ...errors import KincheckError, refuse, unknown
+from ...options import (
+    destination,
+    number_with_unit,
+    option,
+    options,
+)
+
+if TYPE_CHECKING:
+    pass
+
+
+if TYPE_CHECKING:
+    from .model_writer import Writer
+
+
+def formats() -> str:
+    """Return the formats as text for the help."""
+    *first, last = (f"{name} ({each.where})" for name, each in offers("formats").items())
+    return f"{', '.join(first)} or {last}"
+
+
+def writer_of(name: str) -> Writer:
+    """Return the function that writes a mechanism in a format.
+
+    Raises:
+        KincheckError: there is no such format.
+    """
+    writers = offers("writers")
+    if name not in writers:
+        raise KincheckError(unknown("format", name, writers))
+    return writers[name].load()
+
+
+@options
+class Export(OfCase):
+    """Write a case's mechanism in a simulator's format, with a consistent start.
+
+    A second file holds the parts that the format lacks, such as the loop constraints of a URDF.
+    """
+
+    about = "write a mechanism for a simulator"
+    to: str = destination(formats(), metavar="FORMAT", required=True)
+    out: Path | None = destination(
+        "stem of the written files; default: the case's name, in this folder", Path
+    )
+    at: str | None = option(
+        "value of the swept driver at the start, such as 30mm or -20deg, in SI without a unit;"
+        " default: the design position",
+        number_with_unit,
+        "VALUE",
+    )
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from .model_writer import written
+
+        writer = writer_of(self.to)
+        case = registry.case_of(self, driven=False)
+        keep_texts(
+            written(case, writer, driver_value(self.at, case)),
+            case.name,
+            self.out,
+        )
+        return Status.WITHIN
+
+
+def keep_texts(
+    texts: Mapping[str, str], name: str, out: Path | None, json: str | None = None
+) -> None:
+    """Write texts to files that differ by suffix, and print their names.
+
+    Args:
+        json: destination of the JSON; "-" for standard output, which then holds nothing else.
+
+    Raises:
+        KincheckError: a file cannot be written, would overwrite the JSON, or exists and
+            `out` is None.
+    """
+    from ...case.io.atomic_files import require_writable
+    from ...case.io.atomic_files import written as written_file
+
+    first = next(iter(texts))
+    main: Path = out or Path(file_name(name) + first)
+    files = {
+        main if ending == first else main.with_suffix(ending): text
+        for ending, text in texts.items()
+    }
+    for file in files:
+        if out is None and file.exists():
+            raise KincheckError(f"{file} exists already. Give --out to overwrite a file.")
+    require_writable([("--json", json), *(("--out", file) for file in files)])
+    problems: list[str] = []
+    for file, text in files.items():
+        failed = written_file(file, text.encode())
+        problems += failed
+        if not failed:
+            print(file, file=sys.stderr if json == "-" else sys.stdout)
+    refuse(problems)

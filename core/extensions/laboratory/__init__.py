@@ -1,0 +1,10 @@
+"""Stress, benchmarks and the measured claims of the paper."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(
+    __name__,
+    needs=["proofs", "sweep", "compliance"],
+    commands={"bench": "command:BenchAll", "stress": "command:StressEngines"},
+    completions={"family": "stress.families:FAMILIES"},
+)

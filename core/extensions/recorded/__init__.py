@@ -1,0 +1,5 @@
+"""Recordings of other programs as engines: their files, their meaning, and their verdict."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(__name__, needs=["trees"])

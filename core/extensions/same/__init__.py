@@ -1,0 +1,5 @@
+"""Are two files the same mechanism? Each is the other's judge: see `compare`."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(__name__, needs=["free", "trees"], commands={"same": "command:Same"})

@@ -1,0 +1,157 @@
+"""Mechanisms of files without drivers, with limits and motors of their joints."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ...case.case import Case
+from ...case.models.files import MODEL, kind_of, load, read_tree, root_of
+from ...joints import Revolute, Translational
+from ...mechanism.mechanism import Mechanism
+from ..trees.case import undriven_mechanism
+from ..trees.element import Element, printed_digits
+from ..trees.tree import NO_LIMIT, Limit
+
+# Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
+_PARTS = 12
+_ANGLE = re.compile(r"[-+]?\d*\.\d{2,}")
+# Elements of SDF and USD that have it.
+_SCENES = ("world", "PhysicsScene")
+# A name's ends that programs add to those of links.
+_ENDS = ("_link", "-link", " link", "link_")
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A coordinate of a joint.
+
+    Attributes:
+        turns: it is an angle.
+        start: its value at design [rad or m].
+        actuated: it has a motor.
+    """
+
+    turns: bool
+    start: float = 0.0
+    limit: Limit = NO_LIMIT
+    actuated: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Undriven:
+    """A mechanism without drivers.
+
+    Attributes:
+        name: of its file.
+        coordinates: by joint of one coordinate.
+        links: moving links with a name in the file; others stand between freedoms of one joint.
+        spinning: links whose turn about themselves means nothing.
+        error: relative error of its lengths by the digits of the file, of each joint.
+        angle_error: error of angles in few digits [rad].
+        is_model: whether the file is a model, with limits, motors and frames of links.
+        says_gravity: whether the file can say it.
+        notes: of its reader.
+        without: names by which the user leaves out elements of the file.
+    """
+
+    name: str
+    mechanism: Mechanism
+    coordinates: Mapping[str, Coordinate]
+    links: Collection[str]
+    spinning: Collection[str] = ()
+    error: float = 0.0
+    angle_error: float = 0.0
+    is_model: bool = False
+    says_gravity: bool = True
+    notes: Sequence[str] = ()
+    without: Collection[str] = ()
+
+    def is_between(self, link: str) -> bool:
+        """Return whether a link only stands between joints: it has no mass, and others have."""
+        mechanism = self.mechanism
+        weighed = any(body.mass for body in mechanism.moving)
+        joints = mechanism.joints_on.get(link, ())
+        return weighed and not mechanism.body(link).mass and len(joints) > 1
+
+    @property
+    def chain(self) -> int:
+        """Largest number of joints between the ground and a link."""
+        far = {body.name: 0 for body in self.mechanism.bodies if body.fixed} | {"ground": 0}
+        for _ in self.mechanism.moving:
+            for joint in self.mechanism.joints:
+                for a, b in (joint.bodies, joint.bodies[::-1]):
+                    if a in far:
+                        far.setdefault(b, far[a] + 1)
+        return max(far.values())
+
+
+def undriven_case(case: Case, name: str) -> Undriven:
+    """Return a case without its drivers."""
+    mechanism = replace(case.mechanism, drivers=(), forces=())
+    coordinates = {
+        joint.name: Coordinate(isinstance(joint, Revolute))
+        for joint in mechanism.joints
+        if isinstance(joint, Revolute | Translational)
+    }
+    return Undriven(name, mechanism, coordinates, [body.name for body in mechanism.moving])
+
+
+def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
+    """Return the mechanism of a model or case file.
+
+    Args:
+        without: see `read_tree`.
+
+    Raises:
+        CaseError: it cannot be read.
+    """
+    if kind_of(file) != MODEL:
+        return undriven_case(load(file), file.name)
+    root = root_of(file)
+    mechanism, tree, spinning = undriven_mechanism(read_tree(file, without))
+    coordinates = {
+        name: Coordinate(move.kind == "hinge", move.value, move.limit, name in tree.actuated)
+        for name, move in tree.joints.items()
+        if move.is_axial
+    }
+    digits = printed_digits(root)
+    return Undriven(
+        file.name,
+        replace(mechanism, drivers=(), forces=()),
+        coordinates,
+        [body.name for body in mechanism.moving if body.name in tree.places],
+        spinning,
+        10.0**-digits if digits else 0.0,
+        max(map(_angle_error, root.descendants()), default=0.0),
+        is_model=True,
+        says_gravity=root.tag == "mujoco"
+        or any(each.tag in _SCENES for each in root.descendants()),
+        notes=[f"{file.name}: {note}" for note in tree.notes],
+        without=tree.without,
+    )
+
+
+def _angle_error(element: Element) -> float:
+    """Return the largest error of parts of a half turn in few digits [rad]."""
+    texts = [element.attributes.get(name, "") for name in ("rpy", "euler")]
+    texts += [element.text] * (element.tag == "pose")
+    found = 0.0
+    for text in " ".join(texts).split():
+        if _ANGLE.fullmatch(text):
+            part = float(text) * _PARTS / math.pi
+            error = abs(part - round(part)) * math.pi / _PARTS
+            last = 10.0 ** -len(text.partition(".")[2])
+            found = max(found, error * (round(part) != 0 and error <= last))
+    return found
+
+
+def plain_name(name: str) -> str:
+    """Return a name without the ends and signs changed by programs."""
+    name = name.rpartition("::")[2].lower()
+    for end in _ENDS:
+        name = name.removesuffix(end).removeprefix(end)
+    return re.sub(r"[\W_]+", "_", name)

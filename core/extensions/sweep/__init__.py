@@ -1,0 +1,12 @@
+"""Studies of a design: its hardpoints varied, its outputs reduced over all variants."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(
+    __name__,
+    needs=["cluster"],
+    commands={"sweep": "command:Sweep"},
+    public={"sweep": "command:Sweep"},
+    schemas={"variation": "variation_schema:variation_schema"},
+    keys={"variation": "variation_schema:__doc__"},
+)

@@ -1,0 +1,412 @@
+"""Files beside a URDF, with its loops: NAME.constraints.json, as `kincheck export --to urdf` writes
+it, and NAME.yaml of example-parallel-robots (github.com/Gepetto/example-parallel-robots):
+
+closed_loop: [[frame, frame], ...]     links of the URDF that coincide
+type: ["6d", "3d", ...]                all, or only the points
+name_mot: [joint, ...]                 joints with a motor
+joint_name: [joint, ...]               joints of another type than the URDF can say
+joint_type: [SPHERICAL, UJOINT_XY, FIXED, ...]
+
+All conditions of a joint in NAME.constraints.json together give its freedoms: `offset` leaves
+slides across its direction, and pairs of `directions` leave turns. The joint is a chain of slides
+and turns from the zero pose, in which all conditions hold.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from ...algebra import Vec3, X, Y, Z, cross, quat, vec
+from ...case.io.document import fault, parse, parse_yaml, read_text, shown, unknown_name, usable
+from ...errors import CaseError, remedy
+from ...joints.base import triad
+from ...joints.polynomial import HIGHEST
+from ...mechanism.mechanism import Vector
+from .element import Element
+from .graph import Freedom, Graph, Joint
+from .place import Place, unit_quaternion, unit_vector
+from .tree import Closure, Coupling, Kind, Move, Tree, require_spline
+
+CONSTRAINTS = ".constraints.json"
+YAML = (".yaml", ".yml")
+LARGEST_FILE = 4_000_000
+SCHEMA = "kincheck-constraints/1"
+RELATIONS = ("linear", "polynomial", "spline")
+# Rounding of exported numbers, relative to the size of the numbers.
+OPEN = 1e-9
+_UNIVERSAL = re.compile(r"UJOINT_([XYZ])([XYZ])")
+_TYPES = {"SPHERICAL": "spherical", "FIXED": "fixed"}
+
+
+class LinkPoint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A point of a link, in its axes [m]."""
+
+    link: str
+    point: Vector
+
+
+class LinkDirection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A direction of a link, in its axes [-]."""
+
+    link: str
+    direction: Vector
+
+
+class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A condition of a joint; the fields depend on its kind."""
+
+    joint: str
+    kind: Literal[
+        "coincident", "distance", "directions", "offset", "linear", "polynomial", "spline"
+    ]
+    i: LinkPoint | None = None
+    j: LinkPoint | None = None
+    x: LinkDirection | None = None
+    y: LinkDirection | None = None
+    value: float = 0.0
+    weights: dict[str, float] = {}
+    driven: str = ""
+    driving: str = ""
+    coefficients: Annotated[list[float], msgspec.Meta(max_length=HIGHEST + 1)] = []
+    points: tuple[tuple[float, float], ...] = ()
+
+
+class BodyFrame(msgspec.Struct, frozen=True):
+    """The frame of a body in its link."""
+
+    link: str
+    origin: Vector
+    euler_parameters: tuple[float, float, float, float]
+
+
+class ConstraintsFile(msgspec.Struct, frozen=True):
+    """NAME.constraints.json; its other keys are for people."""
+
+    constraints: list[Condition]
+    bodies: dict[str, BodyFrame] = {}
+
+
+class PairsFile(msgspec.Struct, frozen=True):
+    """NAME.yaml; its other keys are for control programs."""
+
+    closed_loop: list[tuple[str, str]] = []
+    type: list[str] = []
+    name_mot: list[str] = []
+    joint_name: list[str] = []
+    joint_type: list[str] = []
+
+
+@dataclass(frozen=True)
+class LoopFiles:
+    """Content of the files beside a URDF.
+
+    Attributes:
+        pairs: pairs of frames, which the zero pose need not bring together.
+        types: types of joints in place of those of the URDF; letters for a universal joint.
+    """
+
+    constraints: tuple[Path, ConstraintsFile] | None = None
+    pairs: tuple[Path, PairsFile] | None = None
+    types: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the files."""
+        return [each[0].name for each in (self.constraints, self.pairs) if each]
+
+    def add(self, graph: Graph) -> None:
+        """Add the loops to the links of a robot.
+
+        Raises:
+            CaseError: they name unknown links, or do not hold in the zero pose.
+        """
+        if self.constraints is not None:
+            _add_constraints(*self.constraints, graph)
+        if self.pairs is not None:
+            _add_pairs(*self.pairs, graph)
+
+    def place(self, tree: Tree) -> None:
+        """Give links the frames of the bodies they are written of, whose joints and numbers a URDF
+        has in other axes.
+
+        Raises:
+            CaseError: a frame has no turn.
+        """
+        if self.constraints is None:
+            return
+        file, found = self.constraints
+        for name, each in found.bodies.items():
+            if each.link != name or name not in tree.places:
+                continue
+            if not all(map(usable, (*each.origin, *each.euler_parameters))) or not any(
+                each.euler_parameters
+            ):
+                raise fault(file, f"bodies: {name}", "has no frame; export the case anew")
+            turn = unit_quaternion(quat(each.euler_parameters))
+            frame = Place(vec(each.origin), turn)
+            tree.places[name] = tree.places[name] * frame
+            if name in tree.moving:
+                tree.moving[name] = tree.moving[name] * frame
+                back = frame.inverse
+                masses = tree.masses.get(name, ())
+                tree.masses |= {name: [mass.in_frame(back) for mass in masses]} if masses else {}
+
+
+def read_loop_files(root: Element) -> LoopFiles:
+    """Read the files beside a URDF, of the same name with another ending.
+
+    Raises:
+        CaseError: one of them cannot be read, or PyYAML is missing.
+    """
+    file, constraints, types = root.file, None, dict[str, str]()
+    own = file.with_suffix(CONSTRAINTS)
+    if own.exists():
+        constraints = own, _constraints(own)
+    paired = next((each for each in map(file.with_suffix, YAML) if each.exists()), None)
+    if paired is None:
+        return LoopFiles(constraints)
+    pairs = _pairs(paired)
+    for name, kind in zip(pairs.joint_name, pairs.joint_type, strict=True):
+        types[name] = _TYPES.get(kind, kind.removeprefix("UJOINT_"))
+        if all(each.attributes.get("name") != name for each in root.findall("joint")):
+            raise fault(
+                paired,
+                "joint_name",
+                f"found {name!r}, expected a joint of {file.name}; correct it, or remove it with"
+                " its joint_type",
+            )
+    return LoopFiles(constraints, (paired, pairs), types)
+
+
+def _text(file: Path) -> str:
+    return read_text(file, LARGEST_FILE, "it holds the loops of one robot; take out the rest")
+
+
+def _constraints(file: Path) -> ConstraintsFile:
+    tables: dict[str, Any] = parse(file, _text(file))
+    if tables.get("schema") != SCHEMA:
+        raise fault(
+            file,
+            "schema",
+            f"found {tables.get('schema')!r}, expected {SCHEMA!r}, as kincheck export writes it;"
+            " rename a file of another kind",
+        )
+    try:
+        return msgspec.convert(tables, ConstraintsFile)
+    except msgspec.ValidationError as error:
+        raise CaseError(str(fault(file, "constraints", f"{error}; export the case anew"))) from None
+
+
+def _pairs(file: Path) -> PairsFile:
+    try:
+        found = msgspec.convert(parse_yaml(file, _text(file)), PairsFile)
+    except msgspec.ValidationError as error:
+        raise fault(
+            file,
+            "",
+            f"{error}, expected closed_loop, type, name_mot, joint_name and joint_type of"
+            " example-parallel-robots; correct it, or rename a file of another kind",
+        ) from None
+    for key, values, other, others in (
+        ("type", found.type, "closed_loop", found.closed_loop),
+        ("joint_type", found.joint_type, "joint_name", found.joint_name),
+    ):
+        if len(values) != len(others):
+            raise fault(
+                file,
+                key,
+                f"found {len(values)}, expected {len(others)}, one for each {other}; complete it",
+            )
+    for kind in found.joint_type:
+        if kind not in _TYPES and not _UNIVERSAL.fullmatch(kind):
+            known = (*_TYPES, "UJOINT_XY")
+            raise unknown_name(
+                file, "joint_type", kind, known, f"{', '.join(known)}, or other axes"
+            )
+    for kind in found.type:
+        if kind.lower() not in ("3d", "6d"):
+            raise fault(file, "type", f"found {shown(kind)}, expected 3d or 6d; correct it")
+    return found
+
+
+def _add_pairs(file: Path, pairs: PairsFile, graph: Graph) -> None:
+    # as in Pinocchio, a joint has a frame too: that of its link
+    frames = {joint.name: joint.links[1] for joint in graph.joints}
+    frames |= {name: name for name in graph.places}
+    for names, kind in zip(pairs.closed_loop, pairs.type, strict=True):
+        for name in names:
+            if name not in frames:
+                raise unknown_name(file, "closed_loop", name, frames, "a link or joint")
+        first, second = (frames[name] for name in names)
+        places = graph.places[first], graph.places[second]
+        title = f"{names[0]} = {names[1]}"
+        element = Element(file, "", {}, 1, words=f"closed_loop: {title}")
+        freedoms: list[Freedom] = [("", "ball", X)] if kind.lower() == "3d" else []
+        links, at = (first, second), places[0].at
+        graph.loops.append(Joint.of(title, links, at, freedoms, element, frames=places))
+    coordinates = {move.name for joint in graph.joints for move in joint.moves}
+    graph.tree.actuated |= coordinates & {*pairs.name_mot}
+
+
+def _add_constraints(file: Path, found: ConstraintsFile, graph: Graph) -> None:
+    groups: dict[str, list[Condition]] = {}
+    for each in found.constraints:
+        if each.kind not in RELATIONS:
+            groups.setdefault(each.joint, []).append(each)
+    for name, conditions in groups.items():
+        _Group(_element(file, name), name, conditions, graph).add()
+    names = {*groups}
+    for k, each in enumerate(found.constraints, 1):
+        if each.kind not in RELATIONS:
+            continue
+        name = each.joint if each.joint not in names else f"{each.joint}.{k}"
+        names.add(name)
+        element = _element(file, each.joint)
+        if each.kind == "linear":
+            coupling = Coupling(name, each.weights, {}, (0.0,), element)
+        elif each.coefficients or each.points:
+            pair = {each.driven: 1.0}, {each.driving: 1.0}
+            coupling = Coupling(name, *pair, each.coefficients, element, each.points)
+            require_spline(element, each.points)
+        else:
+            raise element.fault("found no coefficients, expected some; export the case anew")
+        graph.couplings.append(coupling)
+
+
+def _element(file: Path, joint: str) -> Element:
+    return Element(file, "", {}, 1, words=f"constraints: joint {joint!r}")
+
+
+class _Group:
+    """The conditions of one joint, by their kinds."""
+
+    def __init__(
+        self, element: Element, name: str, conditions: Sequence[Condition], graph: Graph
+    ) -> None:
+        self.element, self.name, self.graph = element, name, graph
+        self.coincident, self.distance, self.offset, self.directions = (
+            [each for each in conditions if each.kind == kind]
+            for kind in ("coincident", "distance", "offset", "directions")
+        )
+        first = conditions[0]
+        ends = (first.i, first.j) if first.i and first.j else (first.x, first.y)
+        if ends[0] is None or ends[1] is None:
+            raise self._fault("found no two links, expected i and j, or x and y")
+        self.links = self._link(ends[0].link), self._link(ends[1].link)
+
+    def add(self) -> None:
+        """Add the joint."""
+        if self.distance:
+            self._add_distance()
+            return
+        found = [*self._slides(), *self._turns()]
+        freedoms: list[Freedom] = [
+            (f".{k}" * (len(found) > 1), *each) for k, each in enumerate(found, 1)
+        ]
+        joint = Joint.of(self.name, self.links, self._pivot(), freedoms, self.element)
+        self.graph.loops.append(joint)
+
+    def _fault(self, problem: str) -> CaseError:
+        return self.element.fault(f"{problem}; export the case anew")
+
+    def _link(self, name: str) -> str:
+        if name not in self.graph.places:
+            raise self._fault(
+                f"found {shown(name)}, expected a link; {remedy(name, self.graph.places)}"
+            )
+        return name
+
+    def _point(self, end: LinkPoint | None) -> Vec3:
+        """Return a point, global."""
+        if end is None:
+            raise self._fault("found a condition without i and j, expected two points")
+        return self.graph.places[self._link(end.link)].point(vec(end.point))
+
+    def _axis(self, along: LinkDirection | None) -> Vec3:
+        """Return a direction, global, length one."""
+        if along is None:
+            raise self._fault("found a condition without x, expected a direction")
+        found = self.graph.places[self._link(along.link)].direction(vec(along.direction))
+        if not math.hypot(*found) > 0.0:
+            raise self._fault("found a direction of length zero, expected an axis")
+        return unit_vector([*found])
+
+    def _require_zero(self, residual: float, scale: float) -> None:
+        """Refuse a condition with a residual in the zero pose."""
+        if abs(residual) > OPEN * max(1.0, scale):
+            raise self._fault(
+                f"is open by {residual:.3g} in the zero pose, expected a condition that holds there"
+            )
+
+    def _pivot(self) -> Vec3:
+        """Return the point of the second link about which it turns, global."""
+        for each in (*self.coincident, *self.offset):
+            return self._point(each.j)
+        return self.graph.places[self.links[1]].at
+
+    def _add_distance(self) -> None:
+        """Add a rod; with an offset across a hinge on its first link."""
+        (rod,) = self.distance
+        p, q = self._point(rod.i), self._point(rod.j)
+        apart = q - p
+        length = math.sqrt(apart @ apart)
+        self._require_zero(length - rod.value, rod.value)
+        if not self.offset:
+            places = Place(p), Place(q)
+            self.graph.rods.append(
+                Closure(self.name, self.links, places, self.element, "distance", length)
+            )
+            return
+        (across,) = self.offset
+        hinge = Move(self.name, "hinge", p, self._axis(across.x), self.element)
+        moves = hinge, Move(f"{self.name}.ball", "ball", q, X, self.element)
+        self.graph.loops.append(Joint(self.name, self.links, moves, self.element))
+
+    def _slides(self) -> list[tuple[Kind, Vec3]]:
+        """Return the slides left by offsets; none with a common point."""
+        for each in self.coincident:
+            apart = self._point(each.j) - self._point(each.i)
+            self._require_zero(math.sqrt(apart @ apart), 1.0)
+            return []
+        held: list[Vec3] = []
+        for each in self.offset:
+            x, p, q = self._axis(each.x), self._point(each.i), self._point(each.j)
+            self._require_zero(x @ (q - p) - each.value, abs(each.value))
+            held.append(x)
+        match held:
+            case []:
+                free = [X, Y, Z]
+            case [x]:
+                f, g, _ = triad((*x,))
+                free = [f, g]
+            case [x, y]:
+                free = [unit_vector([*cross(x, y)])]
+            case _:
+                raise self._fault(f"found {len(held)} offsets, expected two at most")
+        return [("slide", axis) for axis in free]
+
+    def _turns(self) -> list[tuple[Kind, Vec3]]:
+        """Return the turns left by pairs of directions."""
+        pairs: list[tuple[Vec3, Vec3]] = []
+        for each in self.directions:
+            x, y = self._axis(each.x), self._axis(each.y)
+            self._require_zero(x @ y - each.value, 1.0)
+            pairs.append((x, y))
+        match pairs:
+            case []:
+                return [("ball", X)]
+            case [(x, y)]:
+                return [("hinge", x), ("hinge", y)]
+            case [(_, y), (_, z)] if abs(y @ z) > 1.0 - OPEN:
+                return [("hinge", y)]
+            case [_, _, _]:
+                return []
+            case _:
+                raise self._fault(f"found {len(pairs)} pairs of directions of no joint")

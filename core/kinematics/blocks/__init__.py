@@ -1,3 +1,0 @@
-"""A mechanism as a list of blocks that are solved one after the other: components with compiled
-programs, or one sparse system; both are followed by one walk.
-"""

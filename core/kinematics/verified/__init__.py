@@ -1,1 +1,0 @@
-"""Verified samples: exact numbers, ball arithmetic, Krawczyk's test."""

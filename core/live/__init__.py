@@ -1,9 +1,0 @@
-"""The live page: a design answers while the user edits it.
-
-    protocol    the messages between page and server, as JSON
-    table       a table of hardpoints, whose numbers are inputs of one program
-    model       a mechanism moved by its drivers
-    server      one page and its sockets on this machine, with token and checks of origin
-
-The page owns the design: each of its messages holds all numbers. The server only answers.
-"""

@@ -1,1 +1,0 @@
-"""Recordings of other programs as engines: their files, their meaning, and their verdict."""

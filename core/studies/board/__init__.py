@@ -1,1 +1,0 @@
-"""The board: how well time steppers hold the free motion of closed loops."""

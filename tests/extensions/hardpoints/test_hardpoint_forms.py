@@ -1,0 +1,230 @@
+"""Hardpoints in further forms: a coordinate in each row, rows without a head, trees in YAML and
+JSON, and assignments of scripts. Each gives the mechanism of the plain table.
+"""
+
+import json
+from dataclasses import replace
+
+import pytest
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.errors import CaseError
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES
+
+from ...support.case_texts import complains, rows, write
+from .test_hardpoint_dialects import POINTS, comma, table
+from .test_workbooks import book
+
+SAID = Supplied("double_wishbone", "mm", "rearward,right,up")
+
+
+def lines(form, points=POINTS, between="\n"):
+    return between.join(form.format(name, *at) for name, at in points.items()) + "\n"
+
+
+def axes(form, points=POINTS, names="xyz", last="\n"):
+    return "".join(
+        form.format(name, axis, x) + last
+        for name, at in points.items()
+        for axis, x in zip(names, at, strict=True)
+    )
+
+
+@pytest.fixture
+def plain(tmp_path):
+    return load(write(tmp_path, table().replace(";", ","), "car.csv"), SAID).mechanism
+
+
+def tree(points=POINTS):
+    return {name: dict(zip("xyz", at, strict=True)) for name, at in points.items()}
+
+
+LISTED = [{"name": name, "position": list(at)} for name, at in POINTS.items()]
+RIGHT = {name: (x, -y, z) for name, (x, y, z) in POINTS.items()}
+NESTED = {
+    "uca": {"chassis_front": "uca_front", "chassis_rear": "uca_rear", "knuckle": "uca_outer"},
+    "lca": {"chassis_front": "lca_front", "chassis_rear": "lca_rear", "knuckle": "lca_outer"},
+    "tie_rod": {"rack": "tierod_inner", "knuckle": "tierod_outer"},
+    "wheel": {"center": "wheel_center"},
+}
+NESTED = {part: {end: POINTS[role] for end, role in ends.items()} for part, ends in NESTED.items()}
+PATTERNS = """
+a coordinate a row | car.csv | axes | {}_{},{} |
+axis in a cell | car.csv | axes | {};{};{} |
+no head | car.csv | lines | {};{};{};{} |
+no head, names last | car.csv | lines | {1},{2},{3},{0} |
+head, names last | car.csv | lines | {1},{2},{3},{0} | X,Y,Z,\\n(mm),(mm),(mm),\\n
+blanks | car.txt | lines | {}   {}  {} {} | name x [mm] y [mm] z [mm]\\n
+blanks, no head | car.dat | lines | {}   {}  {} {} |
+SolidWorks | car.txt | axes | "{}_{}" = {}mm |
+Python | car.txt | lines | p['{}'] = np.array([{}, {}, {}]) |
+one letter a line | car.m | axes | P.{}.{} = {}; |
+YAML | car.yaml | lines | {}: {{x: {}, y: {}, z: {}}} |
+YAML, lists | car.yml | lines | {}: [{}, {}, {}] | units: millimeters\\n
+YAML, named items | car.yaml | lines | - [{}, {}, {}, {}] | points:\\n
+"""
+
+
+@pytest.mark.parametrize(("name", "each", "pattern", "head"), rows(PATTERNS))
+def test_hardpoint_patterns_read_alike(tmp_path, plain, name, each, pattern, head):
+    if ".y" in name:
+        pytest.importorskip("yaml")
+    text = head + {"axes": axes, "lines": lines}[each](pattern)
+    assert load(write(tmp_path, text, name), SAID).mechanism == plain
+
+
+FORMS = {
+    "with a head and units": ("car.csv", axes("{} {};{};[mm];a note").join(["point;value\n", ""])),
+    "a coordinate a row, decimal comma": ("car.csv", comma(axes("{}|{};{}")).replace("|", ".")),
+    "one wide row": (
+        "car.csv",
+        "\n".join(
+            ",".join(each)
+            for each in zip(*(x.split(",") for x in axes("{}_{},{}").split()), strict=False)
+        ),
+    ),
+    "no head, decimal comma": ("car.csv", "Front axle\n" + comma(lines("{};{};{};{}"))),
+    "MATLAB": (
+        "car.m",
+        "clear\n% units: mm\n" + lines("front.{} = [{} {}, {}]; % [mm]") + "d = 18; % [in]",
+    ),
+    "MATLAB, left and right": (
+        "car.m",
+        lines("hp.left.{} = [{}, {}, {}];") + lines("hp.right.{} = [{}, {}, {}];", RIGHT),
+    ),
+    "YAML": ("car.yaml", "hardpoints:\n" + lines("  {}: {{x: {}, y: {}, z: {}}}")),
+    "JSON": ("car.json", json.dumps({"unit": "mm", "hardpoints": {"left": tree()}})),
+    "JSON, parts": ("car.json", json.dumps(NESTED)),
+    "JSON, a list": ("car.json", json.dumps(LISTED)),
+    "JSON, flat": (
+        "car.json",
+        json.dumps(
+            {f"{n}_{a}": x for n, at in POINTS.items() for a, x in zip("xyz", at, strict=False)}
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", FORMS)
+def test_hardpoint_forms_read_alike(tmp_path, plain, kind):
+    name, text = FORMS[kind]
+    if name.endswith(("yaml", "yml")):
+        pytest.importorskip("yaml")
+    found = load(write(tmp_path, text, name), SAID).mechanism
+    assert found == plain
+
+
+def test_sheet_with_coordinate_per_row(tmp_path, plain):
+    rows = [[f"{n}_{a}", x] for n, at in POINTS.items() for a, x in zip("xyz", at, strict=True)]
+    file = book(tmp_path, {"a": [["Hardpoint", "Value [mm]"], *rows], "b": [["x"]]})
+    assert load(file, replace(SAID, units=None)).mechanism == plain
+
+
+def test_json_keys_template_units_axes(tmp_path, plain):
+    keys = {"type": "double_wishbone", "units": "mm", "axes": "rearward,right,up", "side": "left"}
+    file = write(tmp_path, json.dumps({**keys, "hardpoints": tree()}), "car.json")
+    assert load(file).mechanism == plain
+
+
+def test_sheet_option_chooses_json_section(tmp_path, plain):
+    text = json.dumps({"front": tree(), "rear": tree(RIGHT)})
+    file = write(tmp_path, text, "car.json")
+    with pytest.raises(CaseError, match=r"found points in 'front', 'rear', .* --sheet NAME"):
+        load(file, SAID)
+    found = load(file, replace(SAID, sheet="front"))
+    assert found.mechanism == plain
+    assert "9 points of other sections" in found.source
+    with pytest.raises(CaseError, match=r"--sheet: found no section 'frnt', .* 'front'"):
+        load(file, replace(SAID, sheet="frnt"))
+
+
+def test_camel_case_point_names(tmp_path, plain):
+    text = lines("{};{};{};{}").replace("uca_outer", "upperBallJoint").replace("_center", "Centre")
+    found = load(write(tmp_path, text, "car.csv"), SAID).mechanism
+    assert found == plain
+
+
+EXPLORER = """type: macpherson
+units: millimeters
+hardpoints:
+  lower_wishbone_inboard_front: {x: 250, y: 400, z: 200}
+  lower_wishbone_inboard_rear: {x: -250, y: 450, z: 200}
+  lower_wishbone_outboard: {x: 0, y: 900, z: 200}
+  strut_top: {x: -40, y: 700, z: 850}
+  strut_bottom: {x: -14, y: 830, z: 427.5}
+  trackrod_inboard: {x: 50, y: 200, z: 250}
+  trackrod_outboard: {x: 150, y: 800, z: 275}
+  axle_inboard: {x: -20, y: 800, z: 300}
+  axle_outboard: {x: -20, y: 950, z: 300}
+config:
+  wheel:
+    offset: 40
+    tire: {aspect_ratio: 0.55, section_width: 270, rim_diameter: 13}
+"""
+
+
+def test_wheel_of_hub_offset_and_tire(tmp_path):
+    """The offset is inboard; the radius is half the rim in inches and the height of the tire."""
+    pytest.importorskip("yaml")
+    case = load(write(tmp_path, EXPLORER, "car.yaml"), Supplied(axes="iso"))
+    assert case.mechanism.point("wheel_center").position == pytest.approx((-0.02, 0.91, 0.3))
+    (toe,) = (each for each in case.outputs if each.name == "toe")
+    assert toe.vehicle.wheel_radius == pytest.approx(0.3136)
+    assert toe.vehicle.static_camber == 0.0
+
+
+def test_spin_axis_direction_is_omitted(tmp_path):
+    """An axis of one metre from the origin would be a wheel of another attitude."""
+    text = json.dumps({**NESTED, "wheel": NESTED["wheel"] | {"spin_axis": [0, 1, 0]}})
+    case = load(write(tmp_path, text, "car.json"), SAID)
+    assert "wheel.spin_axis" in case.source
+
+
+def test_rocker_axis_point_is_read(tmp_path):
+    """Of the rocker, or of the wheel."""
+    points = {name: list(at) for name, at in TEMPLATES["pushrod_knuckle"].sample.items()}
+    file = write(tmp_path, json.dumps({"points": points}), "car.json")
+    case = load(file, Supplied("pushrod_knuckle", "m", "iso"))
+    assert "rocker_axis" in points
+    assert "left out: nothing" in case.source
+
+
+TEXTS = {
+    "": "",
+    "rows": axes("{}_{},{}"),
+    "rows and units": axes("{}_{};{};mm"),
+    "table": table().replace(";", ","),
+    "script": lines("{} = [{}, {}, {}];"),
+    "units in remarks": lines("{} = [{}, {}, {}]; % [mm]"),
+    "tree": json.dumps(tree()),
+    "list": json.dumps(LISTED),
+}
+FAULTS = """
+two numbers | car.csv | rows | ,-611.75 | ,-611,75 | line 26 ... 2 numbers
+no z | car.csv | rows | wheel_center_z,228.25\\n | | wheel_center without z
+twice | car.csv | rows | | lca_front_x,1\\n | lca_front x: given before, in line 1
+two units | car.csv | rows and units | 228.25;mm | 228.25;m
+    | line 27 ... 'm', and 'mm' above ... one unit
+no names | car.csv | | | -89.75,-259.75,285.25\\n0,1,2 | line 1 ... three numbers without a name
+four numbers | car.csv | | | uca_front,1,2,3,4\\nuca_rear,1,2,3,4 | line 1 ... expected the head
+two heads | car.csv | table | uca_rear | name,x,y,z\\nuca_rear | line 3 ... a second head
+twice in a script | car.m | script | | lca_front = [1, 2, 3];\\n | given before, in line 1
+two units in a script | car.m | units in remarks | | a = [1 2 3]; % [in]\\n
+    | line 2 ... 'mm', and 'inch' above
+an expression | car.m | script | 228.25 | r/2 | missing wheel_center
+twice in a tree | car.json | list | lca_front | uca_front | uca_front: given before
+no z in a tree | car.json | tree | , "z": 228.25 | | wheel_center without z
+a word | car.json | tree | {"x": 0.25, "y": -611.75, "z": 228.25} | [1, 2, "three"]
+    | missing wheel_center
+no points | car.yaml | | | a: 1\\nb: [1, 2]\\n | found no point ... beside a URDF
+a key twice | car.yaml | | | a: [1, 2, 3]\\na: [1, 2, 3]\\n | 'a' is given twice
+a reference | car.yaml | | | a: &b [1, 2, 3]\\nc: *b\\n | expected none
+"""
+
+
+@pytest.mark.parametrize(("name", "form", "old", "new", "message"), rows(FAULTS))
+def test_hardpoint_form_faults(tmp_path, name, form, old, new, message):
+    if name.endswith("yaml"):
+        pytest.importorskip("yaml")
+    assert old in TEXTS[form]
+    complains(write(tmp_path, TEXTS[form].replace(old, new, 1), name), message, SAID)

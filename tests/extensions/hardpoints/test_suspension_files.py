@@ -1,0 +1,384 @@
+"""[suspension] of a case file, points of its wheel, and reports of its outputs."""
+
+import json
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from kincheck.adapters.native import Native
+from kincheck.core.case.io.catalogue import output_catalogue
+from kincheck.core.cli import main
+from kincheck.core.extensions.hardpoints.suspension import SuspensionOutput
+from kincheck.core.extensions.hardpoints.suspension.base import Attitude
+from kincheck.core.harness.record import Outcome, from_json, to_json
+from kincheck.core.harness.run import run
+from kincheck.core.report.junit import to_junit
+from kincheck.core.report.report import write_report
+from kincheck.core.report.table import print_matrix, print_table, to_markdown
+
+from ...support.case_texts import refused
+from ...support.rods_of_templates import solved
+from ...support.suspension_files import (
+    STRUT,
+    TABLE,
+    TOE,
+    changed,
+    loaded,
+    strut_of_table,
+    unreferenced,
+)
+from ...support.variations import HEAD
+from ...support.written_again import written_again
+
+POINTS = STRUT["points"] | {"top": {"body": "chassis", "position": [1.0, 0.55, 0.6]}}
+RODS = [["strut_top", "strut_foot"]]
+ON_CHASSIS = changed(wheel_center="top") | {"points": POINTS}
+WRONG = {
+    "mirrored hardpoints": (
+        changed(side="left"),
+        "suspension.side ... 'left' ... 0.715 m on the other side ... correct side",
+    ),
+    "another convention": (
+        changed(convention="din"),
+        "suspension.convention ... 'din' ... iso8855, sae_j670",
+    ),
+    "no convention": (changed(convention=None), "suspension.convention ... missing"),
+    "no forward": (changed(forward=None), "suspension.forward ... missing"),
+    "zero forward": (
+        changed(forward=[0, 0, 0]),
+        "suspension.forward ... found zero",
+    ),
+    "leaning up": (
+        changed(up=[0.1, 0, 1]),
+        "suspension.up ... right angles to forward ... correct one",
+    ),
+    "no such wheel": (
+        changed(wheel_center="wheel"),
+        "suspension.wheel_center ... 'wheel', expected a point; known: lower_ball",
+    ),
+    "no such kingpin": (
+        changed(kingpin=["lower_ball", "strut"]),
+        "suspension.kingpin ... did you mean 'strut_top'",
+    ),
+    "kingpin upside down": (
+        changed(kingpin=["strut_top", "lower_ball"]),
+        "suspension.kingpin ... the lower point, then",
+    ),
+    "wheel of the chassis": (ON_CHASSIS, "suspension.wheel_center ... a body that moves"),
+    "negative radius": (
+        changed(wheel_radius=-0.3),
+        "suspension.wheel_radius ... -0.3 ... a positive length",
+    ),
+    "share in percent": (
+        changed(brake_share=70),
+        "suspension.brake_share ... 70 ... 0 to 1",
+    ),
+    "no radius": (
+        changed(wheel_radius=None),
+        'outputs.half_track_change ... wheel_radius ... at = "wheel_center"',
+    ),
+    "no kingpin": (
+        changed(kingpin=None),
+        "suspension.kingpin ... missing ... outputs.caster of type 'caster'",
+    ),
+    "kingpin beside links": (
+        changed(kingpin_links=RODS * 4),
+        "kingpin_links: found beside kingpin, ... remove",
+    ),
+    "no such link": (
+        changed(kingpin=None, kingpin_links=[*RODS * 3, ["strut_tip", "strut_foot"]]),
+        "kingpin_links: found 'strut_tip', ... 'strut_top'",
+    ),
+    "no axle": (
+        changed(axle=None),
+        "suspension.axle ... missing ... outputs.wheelbase_change",
+    ),
+    "dive of the rear": (
+        changed(axle="rear"),
+        "outputs.anti_dive ... rear axle, expected a front one",
+    ),
+    "no table": (
+        {key: value for key, value in STRUT.items() if key != "suspension"},
+        "suspension: missing ... add [suspension]",
+    ),
+    "unknown type": (
+        STRUT | {"outputs": {"toe": {"type": "tow"}}},
+        "outputs.toe.type ... 'tow' ... did you mean 'toe'",
+    ),
+    "key of another type": (
+        changed("outputs", toe={"type": "toe", "at": "contact"}),
+        "outputs.toe.at ... unknown key",
+    ),
+    "another place": (
+        changed("outputs", half_track_change={"type": "half_track_change", "at": "hub"}),
+        "'hub' ... wheel_center, contact",
+    ),
+    "spring of nothing": (
+        changed("outputs", motion_ratio={"type": "motion_ratio", "between": ["strut_foot", "top"]}),
+        "outputs.motion_ratio.between ... 'top', expected a point; known: lower_ball",
+    ),
+    "tolerance without reason": (
+        changed("outputs", toe={"type": "toe", "atol": 1e-6}),
+        "outputs.toe.why ... missing",
+    ),
+    "name of a slope": (
+        changed("outputs", **{"toe.per_travel": {"type": "toe"}}),
+        "outputs.toe.per_travel ... another name",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_suspension_is_refused(name):
+    data, said = WRONG[name]
+    refused(lambda: loaded(unreferenced(data)), f"case.json ... {said}")
+
+
+def test_motion_ratio_needs_travel_driver():
+    guide = {"type": "translational", "bodies": ["chassis", "rack"], "axis": [0, 1, 0]}
+    steering = {"type": "joint_displacement", "joint": "guide"}
+    stroke = STRUT["drivers"]["stroke"]
+    data = changed("bodies", unreferenced(STRUT), rack=STRUT["bodies"]["rack"] | {"fixed": False})
+    data = changed("joints", data, guide=guide | {"point": [1.14, 0, 0.1455]})
+    steering |= {"motion": {"type": "ramp", "rate": 0.5}}
+    data = changed("drivers", data, steering=steering)
+    # other drivers are held; values only, because rates along the sweep are others
+    orders = {output.name: output.orders for output in loaded(data).outputs}
+    assert (orders["toe"], orders["toe.per_travel"], orders["motion_ratio"]) == (3, 1, 1)
+    data = changed("drivers", data, stroke=stroke | {"point": "strut_foot"})
+    refused(
+        lambda: loaded(data),
+        "outputs.motion_ratio.type: found 'motion_ratio' while stroke, steering move, ..."
+        " by suspension.travel",
+    )
+    # along the path of both drivers a slope has a meaning
+    case = loaded(data | TOE)
+    assert [output.orders for output in case.outputs] == [3, 2]
+    case = loaded(changed("suspension", data, travel="stroke"))
+    assert case.outputs[0].vehicle.travel == ("stroke",)
+    data = changed("suspension", data, travel="strike")
+    refused(lambda: loaded(data), "suspension.travel: found 'strike', ... 'stroke'")
+
+
+def test_reference_signs_must_match():
+    data = changed(convention="sae_j670")
+    refused(lambda: loaded(data), "signs: found 'iso8855' of signs, expected 'sae_j670'")
+    table = TABLE.replace("# signs: iso8855\n", "")
+    told = 'found no convention of signs, expected ... write "# signs: iso8855"'
+    refused(lambda: loaded(STRUT, table), told)
+
+
+def test_suspension_in_millimetres_and_degrees():
+    """The same numbers in these units are a thousandth of the metres, and degrees."""
+    rows = [[k / 1000, 0.25, 3.0] for k in range(-80, 81, 5)]
+    data = changed(static_camber=-0.02, center_plane=[0.0, 0.01, 0.0]) | {
+        "outputs": STRUT["outputs"] | {"toe": {"type": "toe", "atol": 0.5, "why": "test"}},
+        "reference": {"columns": ["stroke", "toe", "camber.per_travel"], "rows": rows},
+    }
+    large, small = loaded(data), loaded(data | {"units": {"length": "mm", "angle": "deg"}})
+    degree = np.radians(1.0)
+    (toe,) = [output for output in small.outputs if output.name == "toe"]
+    assert toe.atol == pytest.approx(0.5 * degree)
+    for name, unit in (("toe", degree), ("camber.per_travel", 1e3 * degree)):
+        expected = unit * large.reference[name].position
+        assert small.reference[name].position == pytest.approx(expected, rel=1e-14)
+    lengths = ("wheel_radius", "wheelbase", "cg_height", "middle")
+    for name, unit in {"static_camber": degree, **dict.fromkeys(lengths, 1e-3)}.items():
+        one, two = (getattr(case.outputs[0].vehicle, name) for case in (large, small))
+        assert two == pytest.approx(unit * np.array(one), rel=1e-14)
+
+
+def test_per_travel_false_omits_slopes():
+    case = loaded(unreferenced(changed(per_travel=False)) | TOE)
+    assert [output.name for output in case.outputs] == ["toe"]
+    assert case.points == ("wheel_center", "~wheel_center.spin")  # and nothing else is computed
+
+
+def test_own_suspension_output_type(capsys):
+    @dataclass(frozen=True)
+    class Lead(Attitude):
+        type = "lead_of_test_suspension"
+        measure = "m"
+        positive = "ahead of the middle"
+        reads = ("wheel_center",)
+
+        def value(self, corner):
+            return corner.center.x
+
+    try:
+        assert main.main(["list", "--outputs"]) == 0
+        printed = capsys.readouterr().out
+        assert printed.splitlines() == list(output_catalogue())
+        for name, cls in SuspensionOutput.registry.items():
+            assert f"  {name} " in printed
+            assert cls.positive in printed
+        case = loaded(
+            unreferenced(STRUT | {"outputs": {"lead": {"type": Lead.type, "relative": True}}})
+        )
+        assert [output.name for output in case.outputs] == ["lead", "lead.per_travel"]
+    finally:
+        del SuspensionOutput.registry[Lead.type]
+
+
+SIGNS = (
+    "ISO 8855 (x forward, y left, z up); front right wheel; forward is [-1, 0, 0] and up [0, 0, 1]"
+    " in the case's axes"
+)
+
+
+HEADING = f"Signs of mcpherson_suspension: {SIGNS}"
+
+
+@dataclass(frozen=True)
+class Bent:
+    """The native engine with a wheel that is twisted by a micrometre at its axis."""
+
+    native: Native = field(default_factory=Native)
+    name: str = "bent"
+    mode: str = "projection"
+    loop: str = "python"
+
+    def __getattr__(self, name):
+        return getattr(self.native, name)
+
+    def solve(self, model, case, tol):
+        found = self.native.solve(model, case, tol)
+        spin = found.points["~wheel_center.spin"]
+        twisted = replace(spin, position=spin.position + np.array([1e-6, 0.0, 0.0]))
+        return replace(found, points={**found.points, "~wheel_center.spin": twisted})
+
+
+@pytest.fixture(scope="module")
+def results():
+    return run([loaded(STRUT)], [Native(), Bent()], tol=1e-12)
+
+
+def test_twisted_wheel_fails_in_radians(results):
+    native, bent = results.records
+    assert (native.outcome, bent.outcome) == (Outcome.PASS, Outcome.FAIL)
+    error = bent.errors["toe"].position
+    assert error.max_abs == pytest.approx(1e-6 / 0.25, rel=0.02)
+    assert " rad at sample" in bent.message or " rad/m at sample" in bent.message
+    assert 'message="toe: position is off by 4e-06 rad at sample' in to_junit(results).decode()
+
+
+def test_signs_in_reports(results, tmp_path):
+    again = from_json(to_json(results))
+    assert again.run["cases"]["mcpherson_suspension"]["signs"] == SIGNS
+    assert again.records[0].outputs["steer_angle"].sense == "positive: to the left"
+    assert again.records[0].outputs["toe.per_travel"].unit == "rad/m"
+    with (tmp_path / "table").open("w+") as file:
+        print_table(results, file)
+        print_matrix(results, file)
+        file.seek(0)
+        assert [line.startswith(HEADING) for line in file].count(True) == 2
+        file.seek(0)
+        assert next(file).startswith(HEADING)
+    assert to_markdown(results).startswith(f"{HEADING}.\n\n|")
+    write_report(results, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text().replace("&#39;", "'")
+    assert SIGNS in page
+    assert "Positive: toe-in." in page
+    assert "# signs: iso8855" in TABLE
+
+
+def test_signs_in_command_tables(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    parquet = pytest.importorskip("pyarrow.parquet")
+    file = tmp_path / "strut.json"
+    file.write_text(json.dumps(unreferenced(changed("sweep", steps=3)) | TOE))
+    varied = {"ball": {"at": "ball", "sigma": 1.0}}
+    (tmp_path / "vary.json").write_text(
+        json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied})
+    )
+    sweep = "sweep --samples 2 --out . --store all.parquet --vary vary.json"
+    for command, first in (
+        ("explain", "output "),
+        ("reference", "native error"),
+        (sweep, "output"),
+    ):
+        assert main.main([*command.split(), str(file)]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        tables = [k for k, line in enumerate(lines) if line.strip().startswith(first)]
+        assert tables
+        assert all(any(SIGNS in line for line in lines[k - 3 : k]) for k in tables), command
+    assert SIGNS in (tmp_path / "sweep.html").read_text().replace("&#39;", "'")
+    assert (
+        json.loads(parquet.read_schema(tmp_path / "all.parquet").metadata[b"kincheck"])["signs"]
+        == SIGNS
+    )
+
+
+def test_markdown_separates_lengths_and_angles(results):
+    """Lengths are shown where there are any; errors in other units have theirs beside them."""
+    assert "[" not in cells(results)[1]
+    native, bent = cells(run([loaded(unreferenced(STRUT | TOE))], [Native(), Bent()], tol=1e-12))
+    # no truth, and nothing else to be compared with
+    assert native.startswith("not judged, residual")
+    assert bent.startswith("fail: 4e-06 [rad] · ")
+
+
+def cells(results):
+    row = next(
+        line
+        for line in to_markdown(results).splitlines()
+        if line.startswith("| `mcpherson_suspension`")
+    )
+    return [cell.strip() for cell in row.split("|")[2:-1]]
+
+
+CENTER = np.array(STRUT["points"]["wheel_center"]["position"])
+STATIC_TOE, STATIC_CAMBER = 0.01, -0.02
+
+
+def pointed(**changes):
+    """The strut's wheel, a right one with x rearward, with points for its radius and axis."""
+    data = deepcopy(unreferenced(STRUT))
+    spin = [
+        -np.cos(STATIC_CAMBER) * np.sin(STATIC_TOE),
+        np.cos(STATIC_CAMBER) * np.cos(STATIC_TOE),
+        -np.sin(STATIC_CAMBER),
+    ]
+    for name, place in {
+        "hub": CENTER + 0.1 * np.array(spin),
+        "road": CENTER - [0.0, 0.0, 0.3],
+        "inboard": CENTER - [0.0, 0.1, 0.0],
+    }.items():
+        data["points"][name] = {"body": "knuckle", "position": place.tolist()}
+    del data["suspension"]["wheel_radius"]
+    data["suspension"] |= {"wheel_axis": "hub", "wheel_contact": "road"} | changes
+    return data
+
+
+def test_wheel_points_equal_wheel_numbers():
+    data = deepcopy(unreferenced(STRUT))
+    data["suspension"] |= {"static_toe": STATIC_TOE, "static_camber": STATIC_CAMBER}
+    expected = solved(loaded(data))
+    for name, values in solved(loaded(pointed())).items():
+        np.testing.assert_allclose(values, expected[name], rtol=1e-12, atol=1e-12, err_msg=name)
+
+
+FAULTS = [
+    ({"wheel_axis": "hubb"}, "suspension.wheel_axis", "did you mean 'hub'"),
+    ({"static_toe": 0.01}, "suspension.wheel_axis", "beside static_toe and static_camber"),
+    ({"wheel_radius": 0.3}, "suspension.wheel_contact", "beside wheel_radius"),
+    ({"wheel_axis": "inboard"}, "suspension.wheel_axis", "not outboard of the wheel's centre"),
+    ({"wheel_contact": "strut_top"}, "suspension.wheel_contact", "'strut', expected a point of"),
+    ({"wheel_contact": "wheel_center"}, "suspension.wheel_contact", "at the wheel's centre"),
+]
+
+
+@pytest.mark.parametrize(("changes", "key", "words"), FAULTS, ids=str)
+def test_wrong_wheel_point_is_refused(changes, key, words):
+    refused(lambda: loaded(pointed(**changes)), f"{key} ... {words}")
+
+
+@pytest.mark.parametrize("axle", [None, "roll"])
+def test_import_keeps_wheel_points(tmp_path, axle):
+    case = strut_of_table(tmp_path, "0.04:3", "wheel_axis,1,790,309,\n", axle=axle)
+    vehicle = written_again(case, tmp_path).outputs[0].vehicle
+    side = "left_" if axle else ""
+    assert vehicle.wheel_axis == f"{side}wheel_axis"
+    assert vehicle.wheel_contact == f"{side}wheel_contact"
+    assert vehicle.wheel_radius == pytest.approx(0.31)

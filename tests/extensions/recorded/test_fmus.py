@@ -1,0 +1,211 @@
+"""FMUs as engines: a crank in C, as FMI 2 and 3, as a model and as a co-simulation."""
+
+import importlib
+import importlib.util
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import pytest
+
+from ...support.crank import MECHANISM
+
+COMPILER = shutil.which("cc") or shutil.which("gcc")
+pytestmark = [
+    pytest.mark.skipif(COMPILER is None, reason="no C compiler"),
+    pytest.mark.skipif(sys.platform != "linux", reason="builds a binary for Linux"),
+    pytest.mark.skipif(importlib.util.find_spec("fmpy") is None, reason="no FMPy"),
+]
+CASE = f"""{MECHANISM}[drivers.turn.motion]
+type = "sine"
+amplitude = 0.7
+frequency = 1.0
+[sweep]
+driver = "time"
+start = 0.0
+stop = 1.0
+steps = 41
+[outputs.tip_x]
+point = "tip"
+component = "x"
+relative = false
+[outputs.swing]
+type = "joint_angle"
+joint = "pivot"
+"""
+SOURCE = r"""
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+typedef double R;
+typedef struct { R time, turn, rate, sum, x; int steps; } M; /* a co-simulation moves in its steps alone */
+static M *made(int steps) { M *m = calloc(1, sizeof(M)); m->steps = steps; m->x = 500; return m; }
+static R value(M *m, unsigned k) {
+  R all[] = {m->time, m->turn, m->rate, m->steps ? m->x : 500 * cos(m->turn), m->sum, 500 * cos(0.7 * sin(2 * M_PI * m->time))};
+  return all[k];
+}
+static int set(M *m, const unsigned *k, size_t n, const R *x) {
+  for (size_t i = 0; i < n; i++) *(k[i] == 1 ? &m->turn : &m->rate) = x[i];
+  return 0;
+}
+static int get(M *m, const unsigned *k, size_t n, R *x) {
+  for (size_t i = 0; i < n; i++) x[i] = value(m, k[i]);
+  return 0;
+}
+static int step(M *m, R t, R h) { m->sum += h * m->rate; m->time = t + h; m->x = 500 * cos(m->turn); return 0; }
+void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, const void *c, int v, int l) { return made(k); }
+void fmi2FreeInstance(void *m) { free(m); }
+int fmi2SetupExperiment(void *m, int d, R tol, R t, int s, R e) { ((M *)m)->time = t; return 0; }
+int fmi2EnterInitializationMode(void *m) { return 0; }
+int fmi2ExitInitializationMode(void *m) { return 0; }
+int fmi2EnterContinuousTimeMode(void *m) { return 0; }
+int fmi2NewDiscreteStates(void *m, int *e) { memset(e, 0, 5 * sizeof(int)); return 0; }
+int fmi2Terminate(void *m) { return 0; }
+int fmi2SetTime(void *m, R t) { ((M *)m)->time = t; return 0; }
+int fmi2SetReal(void *m, const unsigned *k, size_t n, const R *x) { return set(m, k, n, x); }
+int fmi2GetReal(void *m, const unsigned *k, size_t n, R *x) { return get(m, k, n, x); }
+int fmi2DoStep(void *m, R t, R h, int p) { return step(m, t, h); }
+void *fmi3InstantiateCoSimulation() { return made(1); }
+void *fmi3InstantiateModelExchange() { return made(0); }
+void fmi3FreeInstance(void *m) { free(m); }
+int fmi3EnterInitializationMode(void *m, char d, R tol, R t, char s, R e) { ((M *)m)->time = t; return 0; }
+int fmi3ExitInitializationMode(void *m) { return 0; }
+int fmi3EnterContinuousTimeMode(void *m) { return 0; }
+int fmi3UpdateDiscreteStates(void *m, char *a, char *b, char *c, char *d, char *e, R *t) { *a = *b = *c = *d = *e = 0; return 0; }
+int fmi3Terminate(void *m) { return 0; }
+int fmi3SetTime(void *m, R t) { ((M *)m)->time = t; return 0; }
+int fmi3SetFloat64(void *m, const unsigned *k, size_t n, const R *x, size_t v) { return set(m, k, n, x); }
+int fmi3GetFloat64(void *m, const unsigned *k, size_t n, R *x, size_t v) { return get(m, k, n, x); }
+int fmi3DoStep(void *m, R t, R h, char p, char *a, char *b, char *c, R *last) { *a = *b = *c = 0; *last = t + h; return step(m, t, h); }
+"""  # noqa: E501
+VARIABLES = [
+    ("time", "independent", "s"),
+    ("angle", "input", "rad"),
+    ("rate", "input", "rad/s"),
+    ("x", "output", "mm"),
+    ("sum", "output", ""),
+    ("free_x", "output", "mm"),
+]
+
+
+def functions(fmi):
+    """Return the names of all functions of FMI."""
+    module = importlib.import_module(f"fmpy.fmi{fmi}")
+    kinds = [getattr(module, f"FMU{fmi}{kind}") for kind in ("Slave", "Model")]
+    return {name for kind in kinds for name in dir(kind) if name.startswith(f"fmi{fmi}")}
+
+
+@pytest.fixture(scope="session")
+def binary(tmp_path_factory):
+    """The crank as a library."""
+    folder = tmp_path_factory.mktemp("crank")
+    every = functions(2) | functions(3)
+    lacking = sorted(name for name in every if f"{name}(" not in SOURCE)
+    stubs = "".join(f"int {name}() {{ return 3; }}\n" for name in lacking)
+    (folder / "crank.c").write_text(SOURCE + stubs)
+    command = [COMPILER, "-shared", "-fPIC", "-w", "-o", "crank.so", "crank.c", "-lm"]
+    subprocess.run(command, cwd=folder, check=True)
+    return (folder / "crank.so").read_bytes()
+
+
+def description(fmi, kinds, states):
+    """Return the model description of the crank."""
+    variables = ""
+    for k, (name, causality, unit) in enumerate(VARIABLES):
+        own = f'name="{name}" valueReference="{k}" causality="{causality}"'
+        real = f'unit="{unit}"' if unit else ""
+        three = f"<Float64 {own} {real}/>"
+        variables += three if fmi == 3 else f"<ScalarVariable {own}><Real {real}/></ScalarVariable>"
+    derivative = {2: "<Derivatives><Unknown/></Derivatives>", 3: "<ContinuousStateDerivative/>"}
+    token = "guid" if fmi == 2 else "instantiationToken"
+    elements = "".join(f'<{kind} modelIdentifier="crank"/>' for kind in kinds)
+    return (
+        f'<fmiModelDescription fmiVersion="{fmi}.0" {token}="1" generationTool="own">{elements}'
+        f"<ModelVariables>{variables}</ModelVariables>"
+        f"<ModelStructure>{derivative[fmi] * states}</ModelStructure></fmiModelDescription>"
+    )
+
+
+@pytest.fixture
+def judged(last_record, tmp_path, binary):
+    """Returns status and record of the crank's FMU."""
+
+    def run(fmi, kinds, maps, *, states=False, folder=None, jobs="1"):
+        case, file = tmp_path / "crank.toml", tmp_path / "crank.fmu"
+        case.write_text(CASE)
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("modelDescription.xml", description(fmi, kinds, states))
+            place = folder or {2: "linux64", 3: "x86_64-linux"}[fmi]
+            archive.writestr(f"binaries/{place}/crank.so", binary)
+        options = [word for text in maps for word in ("--map", text)]
+        return last_record(case, "--fmu", file, *options, jobs=jobs)
+
+    return run
+
+
+MODEL, STEPS = "ModelExchange", "CoSimulation"
+
+
+@pytest.mark.parametrize("kind", [MODEL, STEPS])
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_fmu_outputs_belong_to_their_sample(judged, fmi, kind):
+    status, record = judged(fmi, [kind], ["angle=turn", "x=tip_x"])
+    errors = record["errors"]["tip_x"]["position"]
+    assert (status, record["mode"], record["engine"]) == (0, "simulate", "crank")
+    assert errors["max_abs"] < 1e-15
+    assert errors["tolerance"] < 1e-8
+    assert "inputs without a driver keep their start values: rate" in record["message"]
+
+
+def test_fmu_input_offset_has_a_unit(judged):
+    maps = ["angle=turn+90 [deg]", "x=tip_x"]
+    _, record = judged(2, [MODEL], maps)
+    assert record["errors"]["tip_x"]["position"]["max_abs"] == pytest.approx(0.70453, abs=1e-5)
+
+
+def test_fmu_without_inputs_passes(judged):
+    status, record = judged(2, [STEPS], ["free_x=tip_x"])
+    assert status == 0
+    assert "no driver is an input" in record["message"]
+
+
+def test_co_simulation_step_is_halved(judged):
+    maps = ["rate=turn.velocity", "sum=swing [rad]"]
+    status, record = judged(2, [MODEL, STEPS], maps, states=True)
+    errors = record["errors"]["swing"]["position"]
+    assert status == 0
+    assert errors["rms"] > 0.01
+    assert "half the step changes swing by" in record["message"]
+
+
+def test_wrong_co_simulation_output_fails(judged):
+    maps = ["rate=turn.velocity", "sum=swing+0.5 [rad]"]
+    assert judged(2, [STEPS], maps, states=True)[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"folder": "win64"}, "crank.fmu: has binaries for win64, this is linux64"),
+        ({"kinds": [MODEL], "states": True}, "export it for co-simulation"),
+        ({"maps": ["angle=turn"]}, "found no output of the case among x, sum, free_x"),
+        ({"maps": ["sum=swing"]}, 'say --map "sum=swing [UNIT]"'),
+        ({"maps": ["free_x=swing"]}, "unit 'mm' of column 'free_x'"),
+        ({"maps": ["sum=turn [rad]", "x=tip_x"]}, "found sum for turn, expected an input"),
+        ({"jobs": "0"}, "--fmu runs foreign machine code in workers alone. Leave out --jobs 0"),
+    ],
+    ids=str,
+)
+def test_unusable_fmu_is_refused(judged, capsys, options, text):
+    given = {"fmi": 2, "kinds": [STEPS], "maps": ["angle=turn", "x=tip_x"], **options}
+    assert judged(**given)[0] == 2
+    assert text in capsys.readouterr().err
+
+
+def test_fmu_without_description_is_refused(last_record, tmp_path, capsys):
+    case, file = tmp_path / "crank.toml", tmp_path / "a.fmu"
+    case.write_text(CASE)
+    file.write_bytes(b"PK")
+    assert last_record(case, "--fmu", file, jobs=None)[0] == 2
+    assert "expected an FMU; export it anew" in capsys.readouterr().err

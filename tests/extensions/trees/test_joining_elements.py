@@ -1,0 +1,536 @@
+"""What joins links and is not read stops a model by name; extensions that join nothing do not."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck import adapters
+from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.measures import DriverEffort
+from kincheck.core.case.models.files import load
+from kincheck.core.case.quantity import with_markers
+from kincheck.core.extensions.trees.element import parse_xml
+from kincheck.core.extensions.trees.mjcf_language import require_known_attributes
+from kincheck.core.harness.compare import output_series
+
+from ...support.case_texts import complains, refused, write
+from ...support.model_files import driven, edited
+from ...support.model_poses import EXACT, coordinate, solution
+
+DRIVE = driven("drive:-0.2:0.2:5", hold_rest=True)
+HINGE = '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/>{}</joint>'
+GATE = (
+    '<robot name="gate" xmlns:drake="http://drake.mit.edu"><link name="base"/><link name="swing"/>'
+    '<link name="strut"/><link name="follower"/>'
+    + HINGE.format("drive", "base", "swing", '<axis xyz="0 1 0"/>')
+    + HINGE.format("pin", "swing", "strut", '<origin xyz="0 0 0.25"/><axis xyz="0 1 0"/>')
+    + HINGE.format("pivot", "base", "follower", '<origin xyz="0.4 0 0"/><axis xyz="0 1 0"/>')
+    + "{}</robot>"
+)
+IN_SDF = """<sdf version="1.9" xmlns:drake="http://drake.mit.edu"><model name="gate">
+<link name="swing"/><link name="strut"><pose>0 0 0.25 0 0 0</pose></link>
+<link name="follower"><pose>0.4 0 0 0 0 0</pose></link>
+<joint name="drive" type="revolute"><parent>world</parent><child>swing</child>
+<axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="pin" type="revolute"><parent>swing</parent><child>strut</child>
+<axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="pivot" type="revolute"><parent>world</parent><child>follower</child>
+<axis><xyz>0 1 0</xyz></axis></joint>
+{}</model></sdf>"""
+
+
+IN_MJCF = """<mujoco><option gravity="0 0 -1"/><default><geom density="1"/></default><worldbody>
+<body name="a"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="drive"/>
+<geom name="g" size="0.1"/><body name="b" pos="1 0 0"><joint name="pin"/>
+<geom size="0.1" pos="1 0 0"/></body></body></worldbody>
+<contact><exclude body1="a" body2="b"/></contact>
+<sensor><framepos objtype="body" objname="a" reftype="body" refname="b"/></sensor>{}</mujoco>"""
+BASES = {"gate.urdf": GATE, "gate.sdf": IN_SDF, "model.xml": IN_MJCF}
+
+
+def read(folder: Path, text: str, name: str = "gate.urdf", supplied: Supplied = DRIVE):
+    return load(write(folder, text, name), supplied)
+
+
+def read_inside(folder: Path, inside: str, name: str = "gate.urdf", supplied: Supplied = DRIVE):
+    """Read a model with further elements inside."""
+    return read(folder, BASES[name].format(inside), name, supplied)
+
+
+def follower_angles() -> np.ndarray:
+    """The follower of the four-bar, by the circles of its coupler's end: a crank of 0.25 at the
+    origin, a coupler of (0.3, 0.2), and a follower at x = 0.4 whose end is at (-0.1, 0.45).
+    """
+    angle = np.linspace(-0.2, 0.2, 5)
+    pin = 0.25 * np.exp(1j * (np.pi / 2 - angle))  # x and z, as complex numbers
+    back = pin - 0.4
+    size, rod, arm = np.abs(back), np.hypot(0.3, 0.2), np.hypot(0.1, 0.45)
+    along = (size**2 + arm**2 - rod**2) / (2.0 * size)
+    end = back / size * (along - 1j * np.sqrt(arm**2 - along**2))
+    return np.angle(-0.1 + 0.45j) - np.angle(end)
+
+
+AT = "<pose>-0.1 0 0.45 0 0 0</pose>"
+ENDS = "<parent>strut</parent><child>follower</child>"
+BALL = (
+    "<drake:ball_constraint>"
+    '<drake:ball_constraint_body_A name="strut"/><drake:ball_constraint_body_B name="follower"/>'
+    '<drake:ball_constraint_p_AP value="0.3 0 0.2"/>'
+    '<drake:ball_constraint_p_BQ value="-0.1 0 0.45"/></drake:ball_constraint>'
+)
+LOOPS = {
+    "hinge": f'<gazebo><joint name="c" type="revolute">{ENDS}{AT}<axis><xyz>0 1 0</xyz></axis>'
+    "</joint></gazebo>",
+    "hinge, axis in another link": f'<gazebo><joint name="c" type="revolute">{ENDS}{AT}'
+    '<axis><xyz expressed_in="base">0 1 0</xyz></axis></joint></gazebo>',
+    "ball on a frame": '<gazebo><frame name="end" attached_to="follower">'
+    '<pose relative_to="pivot">-0.1 0 0.45 0 0 0</pose></frame>'
+    '<joint name="c" type="ball"><parent>strut</parent><child>end</child></joint></gazebo>',
+    "loop_joint with an axis": '<loop_joint name="c" type="continuous"><axis xyz="0 1 0"/>'
+    '<link1 link="strut" xyz="0.3 0 0.2"/><link2 link="follower" xyz="-0.1 0 0.45"/></loop_joint>',
+    "loop_joint of Isaac Sim": '<loop_joint name="c" type="spherical">'
+    '<link1 link="strut" rpy="0 0 0" xyz="0.3 0 0.2"/>'
+    '<link2 link="follower" rpy="0.1 0 0" xyz="-0.1 0 0.45"/></loop_joint>',
+    "Drake's ball": BALL,
+    "Drake's balls on an axis": BALL
+    + BALL.replace('"0.3 0 0.2"', '"0.3 1 0.2"').replace('"-0.1 0 0.45"', '"-0.1 1 0.45"'),
+}
+
+
+@pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS)
+def test_gazebo_or_drake_loop_closes(loop, tmp_path):
+    case = read_inside(tmp_path, loop)
+    turned = coordinate(case, solution(case), "pivot")
+    expected = follower_angles()
+    assert turned == pytest.approx(expected, abs=EXACT)
+    assert expected[[0, -1]] == pytest.approx([-0.10101, 0.090703], abs=5e-6)
+
+
+TWO = "names the links 'strut' and 'follower', which it may join, and is not read, expected a"
+COUPLED = "couples the joints 'drive' and 'pivot', and is not read, expected <mimic>"
+JOINING = {
+    "attributes": ('<tie a="strut" b="follower"/>', TWO),
+    "children": ('<tie><parent link="strut"/><child link="follower"/></tie>', TWO),
+    "texts": ("<x><a>strut</a><b>follower</b></x>", TWO),
+    "a list": ('<tie links="strut, follower"/>', TWO),
+    "depth": ('<x><y><z><a name="strut"/><b name="follower"/></z></y></x>', TWO),
+    "prefix": ('<any:weld body1="strut" body2="follower"/>', TWO),
+    "plugin": (f'<gazebo><plugin name="p" filename="f">{ENDS}</plugin></gazebo>', TWO),
+    "reference": ('<gazebo reference="strut"><attach>follower</attach></gazebo>', TWO),
+    "joint of a reference": (
+        f'<gazebo reference="strut"><joint name="w" type="ball">{ENDS}</joint></gazebo>',
+        TWO,
+    ),
+    "frames": (
+        '<frame name="f" link="strut"/><frame name="g" link="follower"/><drake:damper>'
+        '<drake:frameA name="f"/><drake:frameC name="g"/></drake:damper>',
+        TWO,
+    ),
+    "the world": ('<close link="strut" to="world"/>', "names the links 'strut' and 'world'"),
+    "MuJoCo's": (
+        '<mujoco><equality><connect body1="strut" body2="follower"/></equality></mujoco>',
+        TWO,
+    ),
+    "a name alone": ('<joint_loop name="closing"/>', "may close a loop, and is not read"),
+    "mimic plugin": (
+        '<gazebo><plugin name="m" filename="libmimic_joint.so"><joint>drive</joint>'
+        "<mimicJoint>pivot</mimicJoint></plugin></gazebo>",
+        COUPLED,
+    ),
+    "mimic of ros2_control": (
+        '<ros2_control><joint name="drive"/><joint name="pivot"><param name="mimic">drive</param>'
+        "</joint></ros2_control>",
+        COUPLED,
+    ),
+    "one motor for two joints": (
+        '<transmission name="t"><joint name="drive"/><joint name="pivot"/><actuator name="m"/>'
+        "</transmission>",
+        "with fewer actuators than joints may couple 'drive' and 'pivot'",
+    ),
+    "another joint of Drake": (
+        '<link name="t"/><drake:joint name="q" type="curvilinear"><parent link="strut"/>'
+        '<child link="t"/></drake:joint>',
+        "found 'curvilinear', expected one of ball, planar, screw, universal",
+    ),
+    "a gear": (
+        '<drake:gearbox ratio="2"><drake:joint1>drive</drake:joint1><drake:joint2>pivot'
+        "</drake:joint2></drake:gearbox>",
+        COUPLED,
+    ),
+    "names with their models": ('<x:weld from="gate::strut" to="/follower"/>', TWO),
+    "a screw without pitch": (
+        '<link name="t"/><drake:joint name="q" type="screw"><parent link="strut"/>'
+        '<child link="t"/></drake:joint>',
+        "<drake:screw_thread_pitch>: missing",
+    ),
+    "a joint that moves the base": (
+        '<gazebo><joint name="w" type="revolute"><parent>world</parent><child>base</child><axis/>'
+        "</joint></gazebo>",
+        "'w' moves 'base', the base, which stands still",
+    ),
+    "a loop_joint without its axis": (
+        '<loop_joint type="revolute"><link1 link="strut"/><link2 link="follower"/></loop_joint>',
+        "<axis>: missing for 'revolute', expected one axis",
+    ),
+    "a bushing of another kind": (
+        '<drake:linear_bushing_rpy><drake:bushing_frameA name="strut"/>'
+        '<drake:bushing_frameC name="follower"/></drake:linear_bushing_rpy>',
+        "<drake:bushing_force_stiffness>: missing, expected three numbers",
+    ),
+    "an unknown element": (
+        '<cam_plan a="1"/>',
+        "unknown in <robot> (--without cam_plan leaves it out)",
+    ),
+    "a mistyped reference": (
+        '<gazebo refrence="strut"><mu1>1</mu1></gazebo>',
+        "did you mean 'reference'?",
+    ),
+    "a link of SDF": ('<gazebo><link name="z"/></gazebo>', "is of SDF, expected links of URDF"),
+}
+JOINING_IN_SDF = {
+    "plugin": '<plugin name="DetachableJoint"><parent_link>strut</parent_link>'
+    "<child_link>follower</child_link></plugin>",
+    "scoped": '<plugin name="p"><a>gate::strut</a><b>follower</b></plugin>',
+    "gripper": "<gripper><palm_link>strut</palm_link><gripper_link>follower</gripper_link>"
+    "</gripper>",
+    "mistyped": "<drake:ball_constrant><a>strut</a><b>follower</b></drake:ball_constrant>",
+    "unknown": '<loop a="strut" b="follower"/>',
+}
+JOINING_IN_MJCF = {
+    "plugin": (
+        '<extension><plugin plugin="p"><config key="i" value="a"/><config key="j" value="b"/>'
+        "</plugin></extension>",
+        "names the links 'a' and 'b', which it may join",
+    ),
+    "soft body": (
+        '<deformable><flex name="f" body="a b"/></deformable>',
+        "holds the bodies a, b together as a soft one",
+    ),
+    **{
+        kind: (f"<equality><{kind}/></equality>", "cannot be read: there is no joint for it")
+        for kind in ("flex", "flexvert", "flexstrain", "distance")
+    },
+}
+JOINING_IN = {
+    "gate.urdf": JOINING,
+    "gate.sdf": {kind: (text, TWO) for kind, text in JOINING_IN_SDF.items()},
+    "model.xml": JOINING_IN_MJCF,
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [(name, kind) for name, table in JOINING_IN.items() for kind in table]
+)
+def test_element_joining_links_is_refused(name, kind, tmp_path):
+    text, said = JOINING_IN[name][kind]
+    refused(
+        lambda: read_inside(tmp_path, text, name), f"{tmp_path / name}: line  ... : < ... {said}"
+    )
+
+
+@pytest.mark.parametrize(
+    "link",
+    [
+        '<link name="strut"><welded to="follower"/></link>',
+        '<link name="strut" welded_to="follower"/>',
+    ],
+    ids=["element", "attribute"],
+)
+def test_link_naming_another_is_refused(link, tmp_path):
+    text = GATE.format("").replace('<link name="strut"/>', link)
+    refused(lambda: read(tmp_path, text), TWO)
+
+
+APART = {
+    "looks and contacts": '<gazebo reference="strut"><material>Gazebo/Blue</material><mu1>1</mu1>'
+    "</gazebo>",
+    "plugins of one link each": '<gazebo><plugin name="x"><bodyName>strut</bodyName></plugin>'
+    '<plugin name="y"><bodyName>follower</bodyName></plugin></gazebo>',
+    "publishers": '<gazebo><plugin name="p" filename="libgazebo_ros_p3d.so">'
+    "<bodyName>strut</bodyName><frameName>base</frameName></plugin></gazebo>",
+    "motors": '<gazebo><plugin name="d" filename="libdrive.so"><leftJoint>drive</leftJoint>'
+    "<rightJoint>pivot</rightJoint></plugin></gazebo>",
+    "sensors": '<gazebo reference="strut"><sensor name="s"><frame>follower</frame></sensor>'
+    "</gazebo>",
+    "ros2_control": '<ros2_control name="s"><hardware><plugin>a/B</plugin></hardware>'
+    '<joint name="drive"/><joint name="pivot"/></ros2_control>',
+    "as many motors": '<transmission name="t"><joint name="drive"/><joint name="pivot"/>'
+    '<actuator name="m"/><actuator name="n"/></transmission>',
+    "collisions": '<drake:collision_filter_group name="g"><drake:member link="strut"/>'
+    '<drake:member link="follower"/></drake:collision_filter_group>'
+    '<disable_collisions link1="strut" link2="follower"/>',
+    "settings": '<mujoco><compiler meshdir="x"/></mujoco><drake:note/>',
+}
+
+
+@pytest.mark.parametrize("text", APART.values(), ids=APART)
+def test_element_joining_nothing_is_left_out(text, tmp_path):
+    case = read_inside(tmp_path, text)
+    assert case.source.split(LEFT_OUT)[1] not in ("", "nothing")
+
+
+def test_links_named_by_numbers(tmp_path):
+    numbered = GATE.replace('"strut"', '"1"').replace('"follower"', '"2"')
+    read(tmp_path, numbered.format('<gazebo reference="1"><mu1>2</mu1></gazebo>'))
+    tied = numbered.format("<tie><link>1</link><link>2</link></tie>")
+    refused(lambda: read(tmp_path, tied), "names the links '1' and '2'")
+
+
+def test_drake_screw_advances_by_pitch(tmp_path):
+    screw = (
+        '<link name="tip"/><drake:joint name="q" type="screw"><parent link="base"/>'
+        '<child link="tip"/><axis xyz="0 1 0"/><drake:screw_thread_pitch value="0.5"/>'
+        "</drake:joint>"
+    )
+    supplied = driven(f"q.rotation:0:{np.pi}:2", hold_rest=True)
+    found = solution(read_inside(tmp_path, screw, supplied=supplied)).bodies["tip"]
+    assert found.r[-1] == pytest.approx((0.0, 0.25, 0.0), abs=EXACT)
+
+
+def test_plugin_repeating_mimic_is_left_out(tmp_path):
+    text = GATE.format(JOINING["mimic plugin"][0] + JOINING["mimic of ros2_control"][0])
+    case = read(
+        tmp_path, text.replace('<origin xyz="0.4', '<mimic joint="drive"/><origin xyz="0.4')
+    )
+    assert [coupler.name for coupler in case.mechanism.couplers] == ["pivot.mimic"]
+
+
+BUSHING = """<drake:linear_bushing_rpy name="rubber">
+<drake:bushing_frameA{0}f{1}bushing_frameA>
+<drake:bushing_frameC{0}g{1}bushing_frameC>
+<drake:bushing_torque_stiffness{2}1 2 3{3}bushing_torque_stiffness>
+<drake:bushing_torque_damping{2}0.1 0.2 0.3{3}bushing_torque_damping>
+<drake:bushing_force_stiffness{2}100 200 300{3}bushing_force_stiffness>
+<drake:bushing_force_damping{2}4 5 6{3}bushing_force_damping></drake:linear_bushing_rpy>"""
+OF_URDF = ' name="', '"></drake:', ' value="', '"></drake:'
+OF_SDF = ">", "</drake:", ">", "</drake:"
+FRAMES_OF_URDF = (
+    '<frame name="f" link="strut" xyz="0.3 0 0.2" rpy="0 0 {0}"/>'
+    '<frame name="g" link="follower" xyz="-0.1 0.01 0.45" rpy="0 0 {1}"/>'
+)
+FRAMES_OF_SDF = (
+    '<frame name="f" attached_to="strut"><pose>0.3 0 0.2 0 0 {0}</pose></frame>'
+    '<frame name="g" attached_to="follower"><pose>-0.1 0.01 0.45 0 0 {1}</pose></frame>'
+)
+QUARTER = f"{np.pi / 2!r}"
+
+
+def rubber(folder: Path, form: str, turned: str = QUARTER):
+    """The bushing between strut and follower; all joints of the open chain are driven or held."""
+    frames = (FRAMES_OF_URDF if form == "urdf" else FRAMES_OF_SDF).format(QUARTER, turned)
+    text = frames + BUSHING.format(*(OF_URDF if form == "urdf" else OF_SDF))
+    return read_inside(folder, text, f"gate.{form}")
+
+
+@pytest.mark.parametrize("form", ["urdf", "sdf"])
+def test_drake_bushing_is_read(form, tmp_path):
+    case = rubber(tmp_path, form)
+    (bushing,) = case.mechanism.forces
+    # frames turned by a quarter about z: their x is global y; C is 0.01 along it from A
+    assert np.array(bushing.axes) == pytest.approx(np.array([[0, 1, 0], [-1, 0, 0]]), abs=1e-15)
+    assert bushing.point == pytest.approx((0.3, 0.01, 0.45))
+    assert bushing.preload == pytest.approx((1.0, 0.0, 0.0), abs=1e-12)
+    assert bushing.stiffness == (100.0, 200.0, 300.0)
+    assert bushing.turning_damping == (0.1, 0.2, 0.3)
+    assert any("halfway between both frames" in note for note in case.assembly)
+
+
+def test_twisted_drake_bushing_is_refused(tmp_path):
+    twisted = f"{np.pi / 2 + 0.4!r}"
+    refused(lambda: rubber(tmp_path, "urdf", twisted), "turned against each other by 0.4")
+
+
+# Generalized forces on both slides by Drake 1.51 (CalcGeneralizedForces, rates 1, 0).
+BY_DRAKE = {
+    "drive": (62.991102249156285, 53.76723589616181, 44.54336954316733),
+    "held": (-135.0, -135.0, -135.0),
+}
+
+
+def test_drake_bushing_forces_match_drake(tmp_path):
+    slide = (
+        '<link name="{1}"><inertial><mass value="1"/></inertial></link><joint name="{0}"'
+        ' type="prismatic"><parent link="base"/><child link="{1}"/><origin xyz="{2}"/>'
+        '<axis xyz="{3}"/></joint>'
+    )
+    text = (
+        '<robot name="r" xmlns:drake="http://drake.mit.edu"><link name="base"/>'
+        + slide.format("drive", "strut", "0 0 0", "1 0 0")
+        + slide.format("held", "follower", "1 0 0.2", "0 0 1")
+        + FRAMES_OF_URDF.format("0.5", "0.5")
+        + BUSHING.format(*OF_URDF)
+        + "</robot>"
+    )
+    drive = driven("drive:0.05:0.2:3", hold=("held",))
+    case = read(tmp_path, text, supplied=drive)
+    mechanism = replace(case.mechanism, gravity=(0.0, 0.0, 0.0))
+    native = adapters.engine("native")
+    for name, expected in BY_DRAKE.items():
+        effort = DriverEffort(name, 1e-9, 0.0, "", driver=name).bound(mechanism)
+        with_effort = with_markers(mechanism, [effort])
+        one = replace(case, mechanism=with_effort, outputs=(effort,), reference={})
+        found = output_series(one, effort, native.solve(native.build(one), one, 1e-13)).position
+        assert found == pytest.approx(-np.array(expected), abs=1e-7)
+
+
+MISTYPED = {
+    "axis": ("<xyz>0 1 0</xyz>", "<xzy>0</xzy>", "unknown in <axis>; did you mean 'xyz'?"),
+    "frame of an axis": ("<xyz>", '<xyz expresed_in="x">', "did you mean 'expressed_in'"),
+    "pose": ("<pose>", '<pose relative="x">', "did you mean 'relative_to'?"),
+    "pose of a link": ("<pose>", "<pse>0</pse><pose>", "unknown in <link>; did you mean 'pose'"),
+    "joint": ("<parent>", "<offset>1</offset><parent>", "unknown in <joint>"),
+    "type": ('"drive" type', '"drive" tpe', "did you mean 'type'?"),
+    "mimic": ("<parent>", '<drake:mimc joint="x"/><parent>', "did you mean 'mimic'?"),
+    "model": ('name="gate"', 'name="gate" placement_fram="x"', "did you mean 'placement_frame'?"),
+    "parent": ("<parent>", '<parent also="strut">', "the attribute 'also'"),
+    "mass": (
+        "<pose>",
+        "<inertial><mas>1</mas></inertial><pose>",
+        "unknown in <inertial>; did you mean 'mass'",
+    ),
+    "inertia": ("<pose>", "<inertial><inertia><ixxx/></inertia></inertial><pose>", "'ixx'"),
+    "damping": ("</xyz>", "</xyz><dynamics><dampin>1</dampin></dynamics>", "'damping'"),
+}
+
+
+MISTYPED_IN_URDF = {
+    "axis": ('<axis xyz="0 1 0"/>', '<axis xzy="0 1 0"/>', "did you mean 'xyz'?"),
+    "origin": ('<origin xyz="0 0', '<origin degrees="1" xyz="0 0', "'degrees'"),
+    "joint": ('<parent link="base"/>', '<parent link="base"/><pose/>', "unknown in <joint>"),
+    "parent": ('<parent link="base"/>', '<parent link="base" offset="1"/>', "'offset'"),
+    "type": ('"drive" type', '"drive" tpe', "did you mean 'type'?"),
+    "mass": (
+        '<link name="strut"/>',
+        '<link name="strut"><inertial><mass vaule="1"/></inertial></link>',
+        "did you mean 'value'?",
+    ),
+    "inertial": (
+        '<link name="strut"/>',
+        '<link name="strut"><inertial><com xyz="1 0 0"/></inertial></link>',
+        "unknown in <inertial>",
+    ),
+    "damping": (
+        '<parent link="base"/>',
+        '<parent link="base"/><dynamics damp="1"/>',
+        "did you mean 'damping'?",
+    ),
+    "leader": (
+        '<parent link="base"/>',
+        '<parent link="base"/><mimic joint="drve"/>',
+        "did you mean 'drive'?",
+    ),
+}
+
+
+MISTYPED_IN_MJCF = {
+    "option": ("gravity", "gravty", "did you mean 'gravity'?"),
+    "default": ("density", "desity", "did you mean 'density'?"),
+    "inertial": ("diaginertia", "diaginertial", "did you mean 'diaginertia'?"),
+    "geom": ('name="g" size', 'name="g" mas', "did you mean 'mass'?"),
+}
+
+
+def test_mjcf_exclusions_and_sensors_join_nothing(tmp_path):
+    case = read_inside(tmp_path, "", "model.xml")
+    assert "contact: exclude (1), sensor: framepos (1)" in case.source
+    assert case.mechanism.gravity == (0.0, 0.0, -1.0)
+
+
+MISTYPED_IN = {
+    "gate.sdf": MISTYPED,
+    "gate.urdf": MISTYPED_IN_URDF,
+    "model.xml": MISTYPED_IN_MJCF,
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [(name, kind) for name, table in MISTYPED_IN.items() for kind in table]
+)
+def test_mistyped_name_is_refused(name, kind, tmp_path):
+    *edit, said = MISTYPED_IN[name][kind]
+    file = edited(tmp_path, BASES[name].format(""), edit, name=name)
+    complains(file, f"{file}: line  ... : ... {said}", DRIVE)
+
+
+def test_mjcf_attribute_of_other_release(tmp_path):
+    read(tmp_path, IN_MJCF.format("").replace('name="g"', 'name="g" mystery="1"'), "model.xml")
+    file = edited(tmp_path, IN_MJCF.format(""), ('"drive"', '"drive" mystery="1"'))
+    complains(file, "the attribute 'mystery', which MJCF does not have here", DRIVE)
+
+
+def test_all_attributes_of_mujoco_are_accepted(tmp_path):
+    """Of its own schema: no attribute that is not read is taken for a mistyped one."""
+    mujoco = pytest.importorskip("mujoco")
+    path: list[str] = []
+    found: dict[str, list[str]] = {}
+    for line in mujoco.mj_printSchema(False, False).splitlines():
+        if head := re.match(r"( *)(?:\(world\))?([a-z]+) \(.\)(.*)", line):
+            path[len(head[1]) // 3 :] = [head[2]]
+            found["/".join(path)] = head[3].split()
+        elif path:
+            found["/".join(path)] += line.split()
+    tested = {
+        **{each: each.split("/")[-1:] for each in ("mujoco/body/geom", "mujoco/body/inertial")},
+        "mujoco/option": ["option"],
+        "mujoco/option/flag": ["option", "flag"],
+        "mujoco/default/geom": ["default", "geom"],
+        "mujoco/default/tendon": ["default", "tendon"],
+        "mujoco/tendon/spatial": ["tendon", "spatial"],
+        "mujoco/tendon/fixed": ["tendon", "fixed"],
+    }
+    for schema, tags in tested.items():
+        text = " ".join(f'{name}=""' for name in found[schema])
+        whole = f"<{tags[-1]} {text}/>"
+        for tag in reversed(tags[:-1]):
+            whole = f"<{tag}>{whole}</{tag}>"
+        if "body" in schema:
+            whole = f"<worldbody><body>{whole}</body></worldbody>"
+        require_known_attributes(parse_xml(tmp_path / "m.xml", f"<mujoco>{whole}</mujoco>"))
+    assert len(found["mujoco/body/geom"]) > 30
+
+
+WITHOUT = {
+    "a tag": ('<tie a="strut" b="follower"/>', "tie", "line 1: <tie>"),
+    "a name": (f'<gazebo><plugin name="p" filename="f">{ENDS}</plugin></gazebo>', "p", "'p'"),
+    "a tag and a name": ('<tie name="k" a="strut" b="follower"/>', "tie/k", "<tie> 'k'"),
+    "what is read": (BALL, "drake:ball_constraint", "<drake:ball_constraint>"),
+}
+
+
+@pytest.mark.parametrize(("text", "name", "said"), WITHOUT.values(), ids=WITHOUT)
+def test_without_option_notes_element(text, name, said, tmp_path):
+    case = read_inside(tmp_path, text, supplied=replace(DRIVE, without=(name,)))
+    assert [joint.name for joint in case.mechanism.joints] == ["drive", "pin", "pivot"]
+    assert case.assembly[0].startswith("left out by --without: ")
+    assert said in case.assembly[0]
+
+
+def test_without_option_refuses_unknown_name(tmp_path):
+    file = write(tmp_path, GATE.format("<mujoco/>"), "gate.urdf")
+    complains(file, "did you mean 'mujoco'", replace(DRIVE, without=("mujcoo",)))
+
+
+def test_without_option_drops_mjcf_equality(tmp_path):
+    tied = '<equality><joint name="t" joint1="drive" joint2="pin"/></equality>'
+    for without in ((), ("t",)):
+        case = read_inside(tmp_path, tied, "model.xml", replace(DRIVE, without=without))
+        assert bool(case.mechanism.couplers) is not bool(without)
+
+
+@pytest.mark.parametrize(
+    "motor", ["", '<transmission name="t{0}"><joint name="j{0}"/></transmission>']
+)
+def test_hold_rest_asks_about_passive_joints(motor, tmp_path):
+    links = '<link name="l0"/>' + "".join(
+        f'<link name="l{k}"/>' + HINGE.format(f"j{k}", f"l{k - 1}", f"l{k}", "") + motor.format(k)
+        for k in range(1, 41)
+    )
+    text = f'<robot name="r">{links}</robot>'
+    supplied = driven("j1:0:1:2", hold_rest=True)
+    if motor:
+        assert len(read(tmp_path, text, supplied=supplied).mechanism.drivers) == 40
+    else:
+        file = write(tmp_path, text, "gate.urdf")
+        complains(file, "39 joints without a motor, of 40  ...  --hold j2 j3 ", supplied)

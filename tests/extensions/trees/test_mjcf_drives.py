@@ -1,0 +1,111 @@
+"""How an MJCF model is said to be driven: what is wrong with it is one message."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+
+from ...support.case_texts import complains
+from ...support.model_files import COUPLING, DRIVEN, GRIPPER, SPRINGS, driven, edited
+
+DRIVES = {
+    "nothing said": (
+        Supplied(),
+        "3 degrees of freedom ... nothing says what drives it ... JOINT:START:STOP ... 2 more",
+    ),
+    "a template": (Supplied("mcpherson", drive=DRIVEN.drive), "--template"),
+    "one short": (
+        Supplied(drive=DRIVEN.drive, hold=SPRINGS[:1]),
+        "3 degrees of freedom, and 2 driven or held ... --hold JOINT for 1 more",
+    ),
+    "one too many": (
+        Supplied(drive=DRIVEN.drive, hold=(*SPRINGS, "left_coupler_joint")),
+        "4 driven or held ... fewer --hold, by 1",
+    ),
+    "only held": (Supplied(hold=SPRINGS), "2 driven or held ... --drive JOINT:START:STOP"),
+    "misspelt": (driven("right_drive_joint:0:1"), "--drive ... 'right_driver_joint'"),
+    "no range": (
+        driven("right_driver_joint"),
+        "--drive ... JOINT:START:STOP ... rad or m ... right_driver_joint:START:STOP",
+    ),
+    "no end": (
+        driven("right_driver_joint:0"),
+        "say from where to where: right_driver_joint:START:STOP",
+    ),
+    "misspelt, no range": (
+        driven("right_drive_joint"),
+        "did you mean 'right_driver_joint'?",
+    ),
+    "too many samples": (
+        driven("right_driver_joint:0:1:2000000"),
+        "2 to 1000000 samples; correct the numbers",
+    ),
+    "no numbers": (
+        driven("right_driver_joint:0:wide"),
+        "--drive ... correct the numbers",
+    ),
+    "no samples": (
+        driven("right_driver_joint:0:1:0"),
+        "--drive ... correct the numbers",
+    ),
+    "degrees without a unit": (
+        driven("right_driver_joint:0:360:9"),
+        "would turn 57.3 times ... :0:360deg:9 for degrees ... right_driver_joint:0:360rad:9",
+    ),
+    "another quantity": (
+        driven("right_driver_joint:0:40mm"),
+        "--drive ... correct the numbers",
+    ),
+    "nowhere": (driven("right_driver_joint:1:1"), "--drive ... correct the numbers"),
+    "two": (
+        driven("right_driver_joint:0:1", "left_driver_joint:0:1"),
+        "2 driven or held ... --hold JOINT for 2 more ... others for 1 that depend on each other",
+    ),
+    "hold misspelt": (
+        Supplied(drive=DRIVEN.drive, hold=("right_spring_link",)),
+        "--hold ... 'right_spring_link_joint'",
+    ),
+    "hold driven": (
+        Supplied(drive=DRIVEN.drive, hold=("right_driver_joint",)),
+        "--hold ... which is driven",
+    ),
+    "units": (Supplied(units="mm"), "--units ... a model ... --drive, --hold"),
+}
+
+
+@pytest.mark.parametrize(
+    ("supplied", "found"),
+    [
+        (
+            DRIVEN,
+            (
+                "--drive: found 'right_driver_joint', which an equality of the file locks, expected"
+                " a joint that moves; name another"
+            ),
+        ),
+        (
+            driven("left_driver_joint:0:0.8", hold=("right_driver_joint",)),
+            "joint that moves; leave it out",
+        ),
+    ],
+)
+def test_locked_joint_is_not_driven(tmp_path, found, supplied):
+    complains(
+        edited(tmp_path, GRIPPER.read_text(), (COUPLING, '<joint joint1="right_driver_joint"')),
+        found,
+        supplied,
+    )
+
+
+@pytest.mark.parametrize("kind", DRIVES)
+def test_drive_and_hold_faults(kind):
+    supplied, said = DRIVES[kind]
+    complains(GRIPPER, said, supplied)
+
+
+@pytest.mark.parametrize("drive", ["0:20deg:5", "0:0.3490658503988659rad:5"])
+def test_drive_takes_angle_unit(drive):
+    case = load(GRIPPER, replace(DRIVEN, drive=(f"right_driver_joint:{drive}",)))
+    assert case.sweep.values[-1] - case.sweep.values[0] == pytest.approx(math.radians(20.0))

@@ -1,0 +1,133 @@
+"""Sizes that are improbable for their unit get a note that names the number, the unit and what it
+may be; never an error.
+"""
+
+from functools import reduce
+
+import pytest
+from kincheck import cases
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.notes import notes
+from kincheck.core.cli import main
+
+from ...support.case_texts import write
+
+TEXT = """
+schema = "kincheck-case/1"
+name = "arm"
+source = "made up for this test"
+[units]
+length = "LENGTH"
+angle = "ANGLE"
+[bodies.arm]
+[bodies.block]
+[joints.pivot]
+type = "revolute"
+bodies = ["ground", "arm"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[joints.slide]
+type = "translational"
+bodies = ["ground", "block"]
+point = [0, 0, 0]
+axis = [1, 0, 0]
+[points.tip]
+body = "arm"
+position = [SIZE, 0, 0]
+[points.end]
+body = "block"
+position = [0, 0, 0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pivot"
+[drivers.push]
+type = "joint_displacement"
+joint = "slide"
+[sweep]
+driver = "DRIVER"
+start = -WAY
+stop = WAY
+steps = 5
+"""
+
+
+def said(tmp_path, length="mm", angle="deg", size="500", driver="push", way="80"):
+    values = {"LENGTH": length, "ANGLE": angle, "SIZE": size, "DRIVER": driver, "WAY": way}
+    text = reduce(lambda text, key: text.replace(key, values[key]), values, TEXT)
+    return notes(load_case(write(tmp_path, text)))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"length": "m", "size": "0.5", "way": "0.08"},
+        {"length": "m", "size": "99", "way": "1"},
+        {"size": "6", "way": "1"},
+        {"driver": "turn", "way": "30"},
+        {"driver": "turn", "way": "360"},
+        {"driver": "turn", "angle": "rad", "way": "6.28"},
+        {"size": "0", "way": "0.001"},
+    ],
+    ids=str,
+)
+def test_probable_size_has_no_note(tmp_path, given):
+    assert said(tmp_path, **given) == []
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            {"size": "0.5", "way": "0.08"},
+            "the mechanism spans 0.5 mm ... expected 5 mm to 100000 mm ... metres declared as mm?",
+        ),
+        ({"length": "m", "size": "500"}, "the mechanism spans 500 m ... mm declared as m?"),
+        (
+            {"way": "0.08"},
+            "'push' ... from -0.08 mm to 0.08 mm ... 0.16 mm ... mechanism of 500 mm"
+            " ... metres declared as mm?",
+        ),
+        (
+            {"length": "m", "size": "0.5"},
+            "from -80 m to 80 m ... 160 m ... mechanism of 0.5 m ... mm declared as m?",
+        ),
+        (
+            {"length": "m", "size": "0.5", "way": "8e-5"},
+            "0.00016 m ... mm converted to m twice?",
+        ),
+        (
+            {"driver": "turn", "way": "0.0349"},
+            "from -0.0349 deg to 0.0349 deg ... 0.0698 deg ... radians declared as deg?",
+        ),
+        (
+            {"driver": "turn", "angle": "rad", "way": "45"},
+            "from -45 rad to 45 rad ... 90 rad ... degrees declared as rad?",
+        ),
+        (
+            {"driver": "turn", "angle": "rad", "way": "0.0005"},
+            "0.001 rad ... degrees converted to radians twice?",
+        ),
+    ],
+    ids=str,
+)
+def test_improbable_size_is_noted(tmp_path, given, words):
+    """In the units of the file."""
+    (note,) = said(tmp_path, **given)
+    assert [each for each in words.split(" ... ") if each not in note] == []
+
+
+def test_built_in_cases_have_no_notes():
+    assert {name: found for name in cases.names() if (found := notes(cases.load(name)))} == {}
+
+
+def test_size_note_in_run_and_explain(tmp_path, capsys):
+    said(tmp_path, way="0.08")
+    file = str(tmp_path / "case.toml")
+    note = "driver 'push' goes from -0.08 mm to 0.08 mm"
+    options = "--jobs 0 --engine native mujoco --out".split()
+    assert main.main(["run", file, *options, str(tmp_path / "out")]) == 0
+    assert note in capsys.readouterr().out
+    assert note.replace("'", "&#39;")[8:] in (tmp_path / "out" / "report.html").read_text()
+    main.main(["explain", file])
+    assert note in " ".join(capsys.readouterr().out.split())
