@@ -2,4 +2,9 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, commands={"bisect": "command:Bisect"})
+EXTENSION = Extension(
+    __name__,
+    needs=["exports"],
+    commands={"bisect": "command:Bisect"},
+    schemas={"bisect": "results:Bisection"},
+)

@@ -87,13 +87,17 @@ class Bisect(Command):
         unread: dict[str, str] = {}
         cases = registry.find_cases(self.cases or registry.cases(), unread)
         refuse([*unread.values(), *self.unwritable("bisect.json", "bisect.html")])
+        if self.engine == STANDARD:
+            raise KincheckError(f"{STANDARD} is kincheck's own engine. Name that of a simulator.")
         package = self.package or releases.package_of(self.engine)
         ends = self.first, self.last
         known = [*self.releases, *ends] if self.releases else releases.releases_of(package)
         row = releases.between(known, *ends)
         pairs = [(case, _with_reactions(case)) for case in cases]
         native = [_native(registry, each) for each in zip(*pairs, strict=True)]
-        task = Task(self.engine, self.mode, pairs, (native[0], native[1]), TOL, self.timeout)
+        task = Task(
+            self.engine, self.mode, package, pairs, (native[0], native[1]), TOL, self.timeout
+        )
         states = States(row, task, releases.Environments(package, 1e9 * self.disk))
         found: list[Change] = []
         try:
@@ -112,7 +116,7 @@ class Bisect(Command):
                     cases=differing,
                     right=right_of(differing.values()),
                 )
-                found.append(with_fields(change, states, registry, self.out))
+                found.append(with_fields(change, states, self.out))
         except KeyboardInterrupt:
             tell("What is finished is kept: the same command goes on from here.")
             raise
@@ -142,8 +146,7 @@ class Bisect(Command):
             problems.append(f"found {len(tried)} releases that can be installed, expected two")
         elif all(idle):
             problems.append(
-                f"the engine {self.engine!r} runs no case in any release that was tried:"
-                f" {idle[0]}"
+                f"the engine {self.engine!r} runs no case in any release that was tried: {idle[0]}"
             )
         deliver(
             report(bisection, states.found),

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import faulthandler
+import importlib.util
 import inspect
+import os
 import pickle
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 
 import msgspec
@@ -23,6 +26,7 @@ class Task:
     """Cases for one engine.
 
     Attributes:
+        package: of the release.
         cases: each as its file has it, and with all its reactions.
         native: the native engine's records of both, the standard where a case has no truth.
         timeout: of a case, and of the engine's import [s].
@@ -30,6 +34,7 @@ class Task:
 
     engine: str
     mode: str | None
+    package: str
     cases: Sequence[tuple[Case, Case]]
     native: tuple[Sequence[Record], Sequence[Record]]
     tol: float
@@ -37,11 +42,32 @@ class Task:
 
 
 class Done(msgspec.Struct, frozen=True):
-    """The records, the file of the engine's class, and why there are none."""
+    """The records, or why there are none.
+
+    Attributes:
+        file: of the engine's class.
+        shadow: another copy of a module of the release, which would be loaded.
+    """
 
     records: list[Record] = []
     file: str = ""
     problem: str = ""
+    shadow: str = ""
+
+
+def shadow_of(package: str) -> str:
+    """Return the file of another copy of a package's module that Python finds first, or nothing."""
+    distribution = metadata.distribution(package)
+    folders = {os.path.realpath(each) for each in sys.path}
+    for file in distribution.files or ():
+        own = Path(os.path.realpath(str(distribution.locate_file(file))))
+        module = own.parent if own.name == "__init__.py" else own
+        name = module.name.partition(".")[0]
+        if str(module.parent) in folders and own.suffix in (".py", ".so", ".pyd"):
+            spec = importlib.util.find_spec(name) if name.isidentifier() else None
+            if spec and spec.origin and os.path.realpath(spec.origin) != str(own):
+                return spec.origin
+    return ""
 
 
 def solved(task: Task) -> Done:
@@ -55,6 +81,8 @@ def solved(task: Task) -> Done:
     from ...harness.run import run
     from ...harness.workers.pool import in_workers
 
+    if shadow := shadow_of(task.package):
+        return Done(shadow=shadow)
     problems: list[str] = []
     known = registry()
     # an import that never ends stops here

@@ -9,7 +9,8 @@ from ...harness.labels import number
 from ...report.sections import Report, Section
 from ...unit_text import value_text
 from .results import UNKNOWN, Bisection, CaseChange, Change
-from .signature import TRUTHS, Signature
+from .signature import IDLE, TRUTHS, Signature
+from .states import counts
 
 CHANGES = ("change", "kind", "case", "curve", "before", "after", "tolerance", "right", "field")
 
@@ -52,21 +53,13 @@ def report(found: Bisection, states: Mapping[str, Signature | None]) -> Report:
                 [],
                 ("release", "cases"),
                 2,
-                [(name, _summary(states.get(name), found.reasons.get(name, ""))) for name in _run(found)],
+                [
+                    *((name, counts(states[name] or {})) for name in found.tried),
+                    *((name, f"cannot be installed: {why}") for name, why in found.reasons.items()),
+                ],
             ),
         ],
     )
-
-
-def _run(found: Bisection) -> list[str]:
-    return [*found.tried, *found.not_installable]
-
-
-def _summary(state: Signature | None, reason: str) -> str:
-    if state is None:
-        return f"cannot be installed: {reason}"
-    outcomes = [each.outcome for each in state.values()]
-    return ", ".join(f"{outcomes.count(each)} {each}" for each in dict.fromkeys(outcomes))
 
 
 def _rows(change: Change) -> list[tuple[str, ...]]:
@@ -90,10 +83,11 @@ def says(change: Change) -> str:
     cases = [*change.cases.values()]
     name = f"{change.earlier} → {change.later}"
     if change.kind == "interface":
-        messages = next(each.messages for each in cases)
+        stops = cases[0].outcomes[1] in {each.value for each in IDLE}
+        release, message = (change.earlier, change.later)[stops], cases[0].messages[stops]
         return (
-            f"{name}: interface changed, {number_of(len(cases), 'case')}: "
-            f"{messages[0] or 'runs'} → {messages[1] or 'runs'}"
+            f"{name}: interface changed. {release} does not run"
+            f" {number_of(len(cases), 'case')}: {message}"
         )
     curves = sum(len(each.curves) for each in cases)
     text = f"{name}: result changed, {number_of(curves, 'curve')} of "

@@ -22,6 +22,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, cast
 
+from ...doors import entry_points
 from ...errors import KincheckError
 from ...extras import ENVIRONMENTS, THREADS, distribution_of
 
@@ -42,9 +43,9 @@ def package_of(engine: str) -> str:
     """Return the distribution of an engine: of kincheck's own extra, of the entry point that offers
     it, or the engine's own name.
     """
-    from ...cli.class_loading import entry_points
+    from ...cli.class_loading import GROUP
 
-    point = entry_points().get(engine)
+    point = entry_points(GROUP).get(engine)
     if point is not None and point.dist is not None:
         return point.dist.name
     return distribution_of(engine) or engine
@@ -133,11 +134,14 @@ class Environments:
     Attributes:
         folder: of all packages.
         most: largest size of the folder [bytes]; the longest unused environments go first.
+        whole: whether all that a release requires is installed beside it, also if this Python has
+            it: its compiled libraries then come from one place.
     """
 
     package: str
     most: float
     folder: Path = field(default_factory=lambda: _folder())
+    whole: bool = False
 
     def path_of(self, release: str) -> Path:
         """Return the folder of a release's environment."""
@@ -145,29 +149,18 @@ class Environments:
         tag = f"{sys.implementation.cache_tag}-{here}"
         return self.folder / re.sub(r"[^\w.+-]", "_", f"{self.package}-{release}-{tag}")
 
-    def python(self, release: str) -> str:
-        """Return the Python of a release, which is installed if it is not there.
+    def python(self, release: str, *, again: bool = False) -> str:
+        """Return the Python of a release, which is installed if it is not there, or again.
 
         Raises:
             NotInstallableError: the installer cannot install it.
             KincheckError: the disk is full, or the folder cannot be written.
         """
         path = self.path_of(release)
-        if not (path / USED).is_file():
+        if again or not (path / USED).is_file():
             self._build(release, path)
         (path / USED).touch()
         return str(_python(path))
-
-    def complete(self, release: str) -> bool:
-        """Install all that a release needs beside it, also what this Python has; return whether
-        that could be done. Its compiled libraries then come from one place.
-        """
-        python = self.python(release)
-        try:
-            _install(python, "--ignore-installed", f"{self.package}=={release}")
-        except NotInstallableError:
-            return False
-        return True
 
     def _build(self, release: str, path: Path) -> None:
         try:
@@ -179,7 +172,7 @@ class Environments:
                 _install(str(python), "--no-deps", "--ignore-installed", wanted)
                 packages = _see_this_python(python)
                 if any(_needs(each) for each in packages.glob("*.dist-info/METADATA")):
-                    _install(str(python), wanted)
+                    _install(str(python), wanted, *["--ignore-installed"] * self.whole)
                 shutil.rmtree(path, ignore_errors=True)
                 made.rename(path)
                 (path / USED).touch()
@@ -234,7 +227,10 @@ def _see_this_python(python: Path) -> Path:
     status, own = run([str(python), "-c", "import site; print(site.getsitepackages()[0])"], 60.0)
     if status:
         raise NotInstallableError(f"its Python does not start ({own.strip()})")
-    folders = [*site.getsitepackages(), *([site.getusersitepackages()] * bool(site.ENABLE_USER_SITE))]
+    folders = [
+        *site.getsitepackages(),
+        *([site.getusersitepackages()] * bool(site.ENABLE_USER_SITE)),
+    ]
     lines = [f"import site; site.addsitedir({each!r})\n" for each in folders]
     # read last, behind the files of the release
     packages = Path(own.strip().splitlines()[-1])

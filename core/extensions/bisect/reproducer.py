@@ -11,9 +11,9 @@ from msgspec.structs import replace
 
 from ...case.io.atomic_files import write_all
 from ...case.io.escape import file_name
-from ...case.io.model_writer import written
-from ...cli.registry import Registry
+from ...doors import offers
 from ...errors import KincheckError, refuse
+from ..exports.model_writer import written
 from .releases import run
 from .results import Change
 from .signature import READER
@@ -34,7 +34,7 @@ It installs both releases into environments below this folder, and compares all 
 TRUTH = """
 Who is right: `python probe.py --read` compares what a release makes of the file with the file.
 """
-COMPARE = '''"""Compare the fields of two releases: python compare.py, or compare.py OLD.npz NEW.npz."""
+COMPARE = '''"""Compare the fields of two releases: python compare.py [OLD.npz NEW.npz]."""
 
 import subprocess
 import sys
@@ -46,11 +46,15 @@ PACKAGE, RELEASES, MODEL = {package!r}, {releases!r}, {model!r}
 ROUND_OFF = 1e-12
 
 
+def python_of(release):
+    windows = sys.platform == "win32"
+    return Path("environments", release, "Scripts/python.exe" if windows else "bin/python")
+
+
 def dump(release):
-    folder = Path("environments", release)
-    python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+    python = python_of(release)
     if not python.exists():
-        venv.create(folder, with_pip=True)
+        venv.create(Path("environments", release), with_pip=True)
     wanted = ["numpy", f"{{PACKAGE}}=={{release}}"]
     subprocess.run([python, "-m", "pip", "install", "--quiet", *wanted], check=True)
     subprocess.run([python, "probe.py", MODEL, f"{{release}}.npz"], check=True)
@@ -73,12 +77,11 @@ if len(sys.argv) == 3:
     compare(*sys.argv[1:])
 else:
     files = [dump(each) for each in RELEASES]
-    python = Path("environments", RELEASES[0], *("Scripts/python.exe", "bin/python")[sys.platform != "win32"].split("/"))
-    subprocess.run([python, __file__, *files], check=True)
+    subprocess.run([python_of(RELEASES[0]), __file__, *files], check=True)
 '''
 
 
-def with_fields(change: Change, states: States, registry: Registry, out: Path | None) -> Change:
+def with_fields(change: Change, states: States, out: Path | None) -> Change:
     """Return a change with the first field that differs, and write its reproducer below a folder;
     an engine without a probe has neither.
     """
@@ -98,7 +101,7 @@ def with_fields(change: Change, states: States, registry: Registry, out: Path | 
         refuse(write_all([(folder / each, text.encode()) for each, text in texts.items()]))
         pythons = [states.environments.python(each) for each in (change.earlier, change.later)]
         try:
-            model = _model(change, states, registry, pythons[1])
+            model = _model(change, states, pythons[1])
         except KincheckError as error:
             tell(f"{name}: no reproducer: {error}")
             return change
@@ -111,7 +114,7 @@ def with_fields(change: Change, states: States, registry: Registry, out: Path | 
     return replace(change, field=field, reproducer=name if out else None)
 
 
-def _model(change: Change, states: States, registry: Registry, python: str) -> str:
+def _model(change: Change, states: States, python: str) -> str:
     """Return the model of the case that changed most; without one, that of the reader."""
     sizes = {
         name: (each.curves[0].difference or 0.0) / (each.curves[0].tolerance or 1.0)
@@ -127,7 +130,9 @@ def _model(change: Change, states: States, registry: Registry, python: str) -> s
     worst = max(sizes, key=lambda each: sizes[each])
     case = next(plain for plain, _ in states.task.cases if plain.name == worst)
     kind, ending = FORMATS[engine]
-    return written(case, registry.writer(kind), None)[ending]
+    if (writer := offers("writers").get(kind)) is None:
+        raise KincheckError(f"there is no writer of {kind}")
+    return written(case, writer.load(), None)[ending]
 
 
 def _first(folder: Path, file: str, pythons: list[str]) -> str | None:
@@ -136,7 +141,9 @@ def _first(folder: Path, file: str, pythons: list[str]) -> str | None:
     said = ""
     try:
         for python, dump in zip(pythons, dumps, strict=True):
-            status, said = run([python, "-P", str(folder / "probe.py"), str(folder / file), dump], 120.0)
+            status, said = run(
+                [python, "-P", str(folder / "probe.py"), str(folder / file), dump], 120.0
+            )
             if status:
                 tell(f"{folder.name}: fields cannot be read: {said.strip()[-300:]}")
                 return None

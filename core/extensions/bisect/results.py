@@ -43,9 +43,7 @@ class CaseChange(msgspec.Struct, frozen=True, kw_only=True):
     curves: list[CurveChange] = []
 
 
-class Change(
-    msgspec.Struct, frozen=True, kw_only=True, rename={"earlier": "from", "later": "to"}
-):
+class Change(msgspec.Struct, frozen=True, kw_only=True, rename={"earlier": "from", "later": "to"}):
     """Two successive releases that can be installed, with different results.
 
     Attributes:

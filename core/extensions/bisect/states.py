@@ -15,6 +15,7 @@ from time import monotonic
 import msgspec
 
 from ...case.io.atomic_files import write_all
+from ...case.io.escape import file_name
 from ...errors import number_of, refuse
 from ...harness.record import to_json
 from ...history.runs import digest
@@ -53,31 +54,34 @@ class States:
         return self.found[release]
 
     def _state(self, release: str) -> Signature | None:
-        begin = monotonic()
-        name = f"{self.environments.package} {release}"
+        begin, environments = monotonic(), self.environments
+        name = f"{environments.package} {release}"
         try:
-            python = self.environments.python(release)
+            python = environments.python(release)
+            kept = self._kept(release)
+            if before := kept.is_file():
+                done = msgspec.json.decode(kept.read_bytes(), type=Done)
+            else:
+                done = self._run(python)
+                if done.shadow and not environments.whole:
+                    environments.whole = True
+                    environments.python(release, again=True)
+                    done = self._run(python)
+                if done.shadow:
+                    raise NotInstallableError(f"{done.shadow} would be loaded in its place")
+                if self._lasting(done, release):
+                    refuse(write_all([(kept, to_json(done))]))
+                self.seconds.append(monotonic() - begin)
         except NotInstallableError as error:
             self.reasons[release] = str(error)
             tell(f"{name}: cannot be installed: {error}")
             return None
-        kept = self._kept(release)
-        before = kept.is_file()
-        if before:
-            done = msgspec.json.decode(kept.read_bytes(), type=Done)
-        else:
-            done = self._run(python)
-            if _unavailable(done) and self.environments.complete(release):
-                done = self._run(python)
-            if self._lasting(done, release):
-                refuse(write_all([(kept, to_json(done))]))
-            self.seconds.append(monotonic() - begin)
         found = {each.case: answer_of(each) for each in done.records}
         if done.problem:
             lost = Answer("error", done.problem, runs=False)
             found = {plain.name: lost for plain, _ in self.task.cases}
         found |= self._reader(python)
-        tell(f"{name}: {_counts(found)}{', kept from before' if before else self._left()}")
+        tell(f"{name}: {counts(found)}{', kept from before' if before else self._left()}")
         return found
 
     def _run(self, python: str) -> Done:
@@ -112,7 +116,9 @@ class States:
             for each in Path(str(files(package))).rglob("*.py")
         )
         environment = self.environments.path_of(release)
-        key = digest(VERSION, replace(self.task, native=((), ()), timeout=0.0), environment.name, sources)
+        key = digest(
+            VERSION, replace(self.task, native=((), ()), timeout=0.0), environment.name, sources
+        )
         return environment / f".{key[:32]}.json"
 
     def _lasting(self, done: Done, release: str) -> bool:
@@ -135,19 +141,12 @@ class States:
 
 def probe_of(engine: str) -> Path | None:
     """Return the script that prints an engine's own numbers, without kincheck; None without one."""
-    folder = engine.partition("-")[0]
-    if not folder.isidentifier():
-        return None
-    path = Path(str(files("kincheck.adapters"))) / folder / "probe.py"
+    path = Path(__file__).parent / "probes" / f"{file_name(engine.partition('-')[0])}.py"
     return path if path.is_file() else None
 
 
-def _unavailable(done: Done) -> bool:
-    outcomes = {each.outcome.value for each in done.records}
-    return bool(outcomes) and outcomes <= {"unavailable", "unsupported"}
-
-
-def _counts(found: Signature) -> str:
+def counts(found: Signature) -> str:
+    """Return the number of cases with each outcome."""
     outcomes = [each.outcome for each in found.values()]
     return ", ".join(f"{outcomes.count(each)} {each}" for each in dict.fromkeys(outcomes))
 
@@ -163,5 +162,3 @@ def require_runs(found: Signature, release: str) -> str:
         return ""
     first = next(iter(found.values()))
     return f"{release}: {first.outcome}: {first.message}"
-
-

@@ -3,7 +3,7 @@
 from math import cos, sin
 from zipfile import ZipFile
 
-ENGINE = '''
+ENGINE = """
 import numpy as np
 from kincheck import PointMotion, Trajectory
 {imports}
@@ -32,7 +32,7 @@ class Wobble:
             points[point] = PointMotion(a + {offset}, rate * t, -{term} * rate**2 * a)
         samples = len(case.sweep.values)
         return Trajectory(points, np.ones(samples, bool), np.zeros(samples, int), residual=0.0)
-'''
+"""
 
 
 def engine(version="1", *, imports="", deed="", offset=0.0, term=1.0):

@@ -1,8 +1,8 @@
 """MuJoCo's own numbers, without kincheck.
 
-    python probe.py --read              what its compiler makes of inertias and limits in a file
-    python probe.py --model             that file
-    python probe.py MODEL.xml OUT.npz   all fields of model and data at one state
+python probe.py --read              what its compiler makes of inertias and limits in a file
+python probe.py --model             that file
+python probe.py MODEL.xml OUT.npz   all fields of model and data at one state
 """
 
 from __future__ import annotations
@@ -18,19 +18,15 @@ BODIES = 40
 ROUND_OFF = 1e-12
 """Of an inertia's size: a thousand times what an eigenvalue solver leaves."""
 
-MODEL = """
-qpos0 body_pos body_quat body_ipos body_iquat body_mass body_subtreemass body_inertia jnt_pos
-jnt_axis jnt_range dof_armature dof_damping eq_data eq_solref eq_solimp body_invweight0
-dof_invweight0 tendon_length0 tendon_invweight0 dof_M0 stat
-""".split()
-DATA = """
-qpos qvel act ctrl xpos xquat xmat xipos ximat xanchor xaxis geom_xpos geom_xmat site_xpos site_xmat
-subtree_com cdof cinert crb ten_length ten_J actuator_length actuator_moment qM M qLD qLDiagInv ncon
-nefc efc_type efc_id efc_J efc_pos efc_margin efc_frictionloss efc_diagApprox efc_KBIP efc_D efc_R
-ten_velocity actuator_velocity cvel cdof_dot qfrc_bias qfrc_spring qfrc_damper qfrc_passive efc_vel
-efc_aref actuator_force qfrc_actuator qfrc_smooth qacc_smooth efc_b efc_AR efc_force efc_state
-qfrc_constraint qacc cacc cfrc_int cfrc_ext sensordata
-""".split()
+MODEL = """qpos0 body_pos body_quat body_ipos body_iquat body_mass body_subtreemass body_inertia
+jnt_pos jnt_axis jnt_range dof_armature dof_damping eq_data eq_solref eq_solimp body_invweight0
+dof_invweight0 tendon_length0 tendon_invweight0 dof_M0 stat"""
+DATA = """qpos qvel act ctrl xpos xquat xmat xipos ximat xanchor xaxis geom_xpos geom_xmat site_xpos
+site_xmat subtree_com cdof cinert crb ten_length ten_J actuator_length actuator_moment qM M qLD
+qLDiagInv ncon nefc efc_type efc_id efc_J efc_pos efc_margin efc_frictionloss efc_diagApprox
+efc_KBIP efc_D efc_R ten_velocity actuator_velocity cvel cdof_dot qfrc_bias qfrc_spring
+qfrc_damper qfrc_passive efc_vel efc_aref actuator_force qfrc_actuator qfrc_smooth qacc_smooth
+efc_b efc_AR efc_force efc_state qfrc_constraint qacc cacc cfrc_int cfrc_ext sensordata"""
 """Fields in the order in which MuJoCo computes them; others follow."""
 TIMES = {"timer", "signature", "solver", "warning", "time", "maxuse_arena", "narena", "nbuffer"}
 
@@ -70,15 +66,16 @@ def read() -> dict[str, Any]:
     """
     mujoco: Any = import_module("mujoco")
     m, truth = mujoco.MjModel.from_xml_string(model()), inertias()
-    found = []
+    found: list[Any] = []
     for k in range(BODIES):
         turned = np.zeros(9)
         mujoco.mju_quat2Mat(turned, m.body_iquat[k + 1])
         axes = turned.reshape(3, 3)
         found.append(axes @ np.diag(m.body_inertia[k + 1]) @ axes.T)
     scale = np.abs(truth).max(axis=(1, 2))[:, None, None]
+    given, made = ((np.array(each) / scale).ravel().tolist() for each in (truth, found))
     return {
-        "inertia": [*((each / scale).ravel().tolist() for each in (found, truth)), ROUND_OFF],
+        "inertia": [made, given, ROUND_OFF],
         "limit": [m.jnt_range.ravel().tolist(), np.radians(limits()).ravel().tolist(), ROUND_OFF],
     }
 
@@ -95,7 +92,7 @@ def fields(file: str) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for part, order in ((m, MODEL), (d, DATA)):
         others = [each for each in dir(part) if not each.startswith("_") and each not in TIMES]
-        for name in dict.fromkeys([*order, *others]):
+        for name in dict.fromkeys([*order.split(), *others]):
             try:
                 values = np.asarray(getattr(part, name, None), dtype=float)
             except (TypeError, ValueError):
