@@ -46,6 +46,7 @@ class Extension:
         writers: function that writes a mechanism in each format; see `case.io.model_writer`.
         formats: who reads each format, for the help.
         converters: function from a model's file to the text that a simulator saves.
+        views: HTML of a result or a mechanism in a notebook.
         steppers: script of each stepper of free motion; see `adapters.steppers.scripts`.
     """
 
@@ -61,6 +62,7 @@ class Extension:
     writers: _Table = field(default_factory=dict[str, str])
     formats: _Table = field(default_factory=dict[str, str])
     converters: _Table = field(default_factory=dict[str, str])
+    views: _Table = field(default_factory=dict[str, str])
     steppers: _Table = field(default_factory=dict[str, str])
 
     @property

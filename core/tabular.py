@@ -9,6 +9,7 @@ from typing import Any, TypeAlias, cast
 from numpy.typing import NDArray
 
 from .dataset import Dataset, Variable
+from .doors import offers
 from .errors import KincheckError, unknown
 from .extras import library
 
@@ -16,6 +17,16 @@ from .extras import library
 DataFrame: TypeAlias = Any
 XarrayDataset: TypeAlias = Any
 Figure: TypeAlias = Any
+
+
+def notebook(view: str, title: str, *what: Any) -> str:
+    """Return a result or a mechanism as HTML for a notebook, or its title alone where the extension
+    of notebooks is not there.
+    """
+    from html import escape
+
+    offer = offers("views").get(view)
+    return offer.load()(title, *what) if offer else f"<div><b>{escape(title)}</b></div>"
 
 
 class Tabular:
@@ -36,9 +47,7 @@ class Tabular:
 
     def _repr_html_(self) -> str:
         """Return the table and the curves for a notebook."""
-        from .notebook_view import to_html
-
-        return to_html(f"{type(self).__name__}: {self.summary()}", self.dataset())
+        return notebook("result", f"{type(self).__name__}: {self.summary()}", self.dataset())
 
     def to_html(self) -> str:
         """Return the table and the curves as HTML, as a notebook shows them."""

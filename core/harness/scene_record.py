@@ -9,7 +9,7 @@ import numpy as np
 
 from ..algebra import quat, rotation_less_identity, vec
 from ..mechanism.mechanism import GROUND
-from ..notebook_view import view
+from ..tabular import notebook
 from ..trajectory import Array
 
 MOST_FRAMES = 25
@@ -162,4 +162,6 @@ class Scene(msgspec.Struct, frozen=True, kw_only=True):
             spots += zip(joint.bodies, ends, strict=False)
             rods += [(ends[0], ends[1])] if len(joint.points) == 2 else []
         spots += [(point.body, at(point.body, point.position)) for point in self.points]
-        return view(title, spots, rods, {b.name for b in self.bodies if b.fixed} | {GROUND})
+        return notebook(
+            "mechanism", title, spots, rods, {b.name for b in self.bodies if b.fixed} | {GROUND}
+        )

@@ -19,6 +19,7 @@ from ..input_checks import finite_numbers, held
 from ..joints import Distance
 from ..joints.base import AxialJoint, Joint, Kind, gap, unit
 from ..joints.coupler import Coupler
+from ..tabular import notebook
 from ..trajectory import MARKER
 from .body import Body, Vector
 from .loads import Bushing, ForceElement, TorsionSpringDamper
@@ -186,8 +187,6 @@ class Mechanism(ByContent):
 
     def to_html(self, title: str) -> str:
         """Return the design position as HTML, below a title."""
-        from ..notebook_view import view
-
         placed = [
             (body, P)
             for joint in self.joints
@@ -203,7 +202,7 @@ class Mechanism(ByContent):
         pairs = [joint.points_on() for joint in self.joints if len(joint.points_on()) == 2]
         rods = [([a], [b]) for a, b in pairs]
         fixed = {each.name for each in self.bodies if each.fixed} | {GROUND}
-        return view(title, spots, rods, fixed)
+        return notebook("mechanism", title, spots, rods, fixed)
 
     def _check_loads(self) -> None:
         gravity = finite_numbers("gravity", self.gravity, 3, "three numbers [m/s^2]")

@@ -15,7 +15,6 @@ from typing import Any, TypeAlias
 
 from ..harness.labels import output_label
 from ..harness.record import Deviation, OutputSeries
-from ..notebook_view import COLOURS
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, with_unit
 from .axis import DISPLAY, Axis
@@ -29,6 +28,8 @@ DIGITS = 10
 REFERENCE = "reference"
 THIN = 1 / 2000  # a band narrower than this fraction of the curve's range is less than a pixel
 
+# Okabe and Ito (https://jfly.uni-koeln.de/color): told apart by colour-blind readers
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES = ("solid", "12px,5px", "3px,3px", "12px,4px,3px,4px", "7px,7px")
 SYMBOLS = (
     "circle-open",

@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .dataset import Dataset
-from .unit_text import with_unit
+from ...dataset import Dataset
+from ...report.figures import COLOURS
+from ...unit_text import with_unit
 
 MOST_ROWS, MOST_COLUMNS, MOST_LINES, MOST_DIAGRAMS = 10, 10, 24, 9
 """Rows and columns of a table, lines of a diagram, and diagrams; the rest is left out, and said."""
 WIDTH, HEIGHT, LEFT, BOTTOM = 320, 170, 58, 30
-# Okabe and Ito (https://jfly.uni-koeln.de/color): told apart by colour-blind readers
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 VIEW, MARGIN = 300.0, 28.0
 """Larger side of a mechanism, and the room around it [px]."""
 _TURN, _TILT = math.radians(-55.0), math.radians(20.0)
