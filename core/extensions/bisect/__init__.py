@@ -1,4 +1,4 @@
-"""kincheck bisect: the release of a simulator that changed a result, the term, and who is right."""
+"""kincheck bisect: the release behind a changed result, the changed term, and the right side."""
 
 from ...doors import Extension
 

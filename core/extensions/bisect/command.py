@@ -24,9 +24,9 @@ DISK = 10.0
 
 @options
 class Bisect(Command):
-    """Find the releases of a simulator that changed a result, or its interface: install releases
-    between two ends in environments apart, compare their curves, reactions and what their reader
-    makes of a file, and say who is right by the truth of the cases.
+    """Find the releases of a simulator with a changed result or interface. Releases between two
+    ends are installed in environments apart. Their curves and reactions are compared, and the
+    numbers of their own reader of files. The truth of the cases says who is right.
 
     Exit status: 0 no change between the ends; 1 changes; 2 the tool could not do all of its work.
     """

@@ -28,7 +28,7 @@ class Task:
     Attributes:
         package: of the release.
         cases: each as its file has it, and with all its reactions.
-        native: the native engine's records of both, the standard where a case has no truth.
+        native: the native engine's records of both, the standard of a case without truth.
         timeout: of a case, and of the engine's import [s].
     """
 
@@ -56,7 +56,7 @@ class Done(msgspec.Struct, frozen=True):
 
 
 def shadow_of(package: str) -> str:
-    """Return the file of another copy of a package's module that Python finds first, or nothing."""
+    """Return the file of another copy of a package's module, found first by Python, or nothing."""
     distribution = metadata.distribution(package)
     folders = {os.path.realpath(each) for each in sys.path}
     for file in distribution.files or ():
@@ -71,7 +71,7 @@ def shadow_of(package: str) -> str:
 
 
 def solved(task: Task) -> Done:
-    """Return what the engine makes of the cases.
+    """Return the engine's answers to the cases.
 
     Raises:
         KincheckError: there is no such engine.
@@ -120,7 +120,7 @@ def _file(engine: object) -> str:
 
 
 def main(task: str, out: str) -> None:
-    """Write what the engine makes of the cases of a task."""
+    """Write the engine's answers to the cases of a task."""
     try:
         done = solved(pickle.loads(Path(task).read_bytes()))
     except KincheckError as error:

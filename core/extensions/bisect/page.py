@@ -16,7 +16,7 @@ CHANGES = ("change", "kind", "case", "curve", "before", "after", "tolerance", "r
 
 
 def report(found: Bisection, states: Mapping[str, Signature | None]) -> Report:
-    """Return tables of the changes and of the releases that were run."""
+    """Return tables of the changes and of the tried releases."""
     tables = [each for change in found.changes for each in _rows(change)]
     links = [
         f"{change.reproducer}/README.md" if change.reproducer else ""

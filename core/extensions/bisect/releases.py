@@ -1,7 +1,7 @@
 """Releases of a package, by the user's own installer, and an environment for each.
 
 An environment is a virtual one whose packages come before those of this Python, in which nothing
-changes. Where a library of the release does not load beside ours, all that it needs is installed.
+changes. If its libraries do not load beside ours, all its requirements are installed.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class NotInstallableError(KincheckError):
 
 
 def package_of(engine: str) -> str:
-    """Return the distribution of an engine: of kincheck's own extra, of the entry point that offers
-    it, or the engine's own name.
+    """Return the distribution of an engine: of kincheck's own extra, of its entry
+    point, or the engine's own name.
     """
     from ...cli.class_loading import GROUP
 
@@ -52,7 +52,7 @@ def package_of(engine: str) -> str:
 
 
 def version_key(text: str) -> Any:
-    """Return a version that orders as Python's packages do.
+    """Return a version in the order of Python's packages.
 
     Raises:
         KincheckError: it is not the version of a package.
@@ -102,8 +102,8 @@ def between(releases: Sequence[str], first: str, last: str) -> list[str]:
 
 
 def releases_of(package: str) -> list[str]:
-    """Return the releases that the installer finds, pre-releases too, and those of wheels in its
-    local folders for another Python, which cannot be installed.
+    """Return the releases known to the installer, pre-releases too, and those of wheels for another
+    Python in its local folders, which cannot be installed.
 
     Raises:
         KincheckError: there is no such package, or the index does not answer.
@@ -134,8 +134,8 @@ class Environments:
     Attributes:
         folder: of all packages.
         most: largest size of the folder [bytes]; the longest unused environments go first.
-        whole: whether all that a release requires is installed beside it, also if this Python has
-            it: its compiled libraries then come from one place.
+        whole: whether all requirements of a release are installed beside it, also those present in
+            this Python: its compiled libraries then come from one place.
     """
 
     package: str
@@ -260,7 +260,7 @@ def _size(folder: Path) -> int:
 
 
 def run(command: Sequence[str], patience: float) -> tuple[int, str]:
-    """Run a program and return its status and output; it and all that it starts end with us.
+    """Run a program and return its status and output; it ends with us, with all its processes.
 
     Args:
         patience: longest time [s]; then the status is -SIGKILL.

@@ -1,4 +1,4 @@
-"""The term that changed: fields of the simulator in both releases, and a folder that repeats their
+"""The changed term: fields of the simulator in both releases, and a folder to repeat their
 comparison without kincheck.
 """
 
@@ -82,7 +82,7 @@ else:
 
 
 def with_fields(change: Change, states: States, out: Path | None) -> Change:
-    """Return a change with the first field that differs, and write its reproducer below a folder;
+    """Return a change with its first differing field, and write its reproducer below a folder;
     an engine without a probe has neither.
     """
     engine, package = states.task.engine.partition("-")[0], states.environments.package
@@ -115,7 +115,7 @@ def with_fields(change: Change, states: States, out: Path | None) -> Change:
 
 
 def _model(change: Change, states: States, python: str) -> str:
-    """Return the model of the case that changed most; without one, that of the reader."""
+    """Return the model of the most changed case; without one, the reader's."""
     sizes = {
         name: (each.curves[0].difference or 0.0) / (each.curves[0].tolerance or 1.0)
         for name, each in change.cases.items()
@@ -136,7 +136,7 @@ def _model(change: Change, states: States, python: str) -> str:
 
 
 def _first(folder: Path, file: str, pythons: list[str]) -> str | None:
-    """Return the first field that differs between two environments."""
+    """Return the first differing field of two environments."""
     dumps = [str(folder / f"{k}.npz") for k in range(2)]
     said = ""
     try:

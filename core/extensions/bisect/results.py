@@ -1,4 +1,4 @@
-"""What a search over releases found, as data: the JSON schema kincheck-bisect/1."""
+"""Results of a search over releases: the JSON schema kincheck-bisect/1."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ UNKNOWN, NEITHER = "unknown", "neither"
 
 
 class CurveChange(msgspec.Struct, frozen=True, kw_only=True):
-    """A curve that differs between two releases.
+    """A curve with different values in two releases.
 
     Attributes:
         output: the output and its quantity, such as "tip.x acceleration".
         difference: largest one between the releases [unit]; null if one of them lacks values.
-        errors: of both releases against the standard [unit]; null where nothing was compared.
-        against: kind of the reference, or the name of the engine that stands in for one.
+        errors: of both releases against the standard [unit]; null if nothing was compared.
+        against: kind of the reference, or the name of the engine in its place.
     """
 
     output: str
@@ -44,12 +44,12 @@ class CaseChange(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Change(msgspec.Struct, frozen=True, kw_only=True, rename={"earlier": "from", "later": "to"}):
-    """Two successive releases that can be installed, with different results.
+    """Two successive installable releases with different results.
 
     Attributes:
-        right: the release that agrees with the truth of its cases; "neither", or "unknown".
-        field: the first field of the simulator that differs, in the order of computation.
-        reproducer: folder below --out that shows it without kincheck.
+        right: the release in agreement with the truth of its cases; "neither", or "unknown".
+        field: the simulator's first differing field, in the order of computation.
+        reproducer: folder below --out to repeat it without kincheck.
     """
 
     earlier: str
@@ -66,7 +66,7 @@ class Bisection(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         not_installable: reason by release.
-        tried: the releases that were run.
+        tried: the releases run.
     """
 
     schema: Literal["kincheck-bisect/1"] = "kincheck-bisect/1"

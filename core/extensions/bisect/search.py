@@ -16,7 +16,7 @@ def changes(
     *,
     every: bool = False,
 ) -> Iterator[tuple[int, int]]:
-    """Yield the places of successive states that differ, in order.
+    """Yield the places of successive different states, in order.
 
     Between two equal states nothing is looked at, unless `every` asks for all of them. Each change
     takes as many states as the binary logarithm of the row.

@@ -1,4 +1,4 @@
-"""Signatures: what a release of a simulator makes of the cases, and how two of them differ."""
+"""Signatures: the answers of a release to the cases, and the differences of two of them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Curve:
 
     Attributes:
         error: largest deviation from the standard.
-        against: kind of the reference, or the name of the engine that stands in for one.
+        against: kind of the reference, or the name of the engine in its place.
     """
 
     values: Array
@@ -44,7 +44,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a release makes of a case.
+    """The answer of a release to a case.
 
     Attributes:
         runs: whether it solves the case, rightly or not.
@@ -124,7 +124,7 @@ def differences(first: Signature, second: Signature, names: Sequence[str]) -> di
 
 
 def _changed(first: Answer, second: Answer) -> Iterator[CurveChange]:
-    """Yield the curves that differ by more than their tolerance; two within it are alike."""
+    """Yield the curves with a difference above their tolerance; two within it are alike."""
     for name in first.curves.keys() | second.curves.keys():
         a, b = first.curves.get(name), second.curves.get(name)
         known = a or b
@@ -158,7 +158,7 @@ def _right(
     curves: Sequence[CurveChange], answers: tuple[Answer, Answer], names: Sequence[str]
 ) -> str:
     """Return who is right by the truth of the changed curves; without one, nobody is known to be.
-    Where only the outcome has changed, a pass is right.
+    If only the outcome has changed, a pass is right.
     """
     decided = [each for each in curves if each.against in TRUTHS]
     if decided:
@@ -176,6 +176,6 @@ def _one(right: Sequence[str]) -> str:
 
 
 def right_of(cases: Iterable[CaseChange]) -> str:
-    """Return the release that is right in all cases with a truth."""
+    """Return the right release in all cases with a truth."""
     found = {each.right for each in cases} - {UNKNOWN}
     return found.pop() if len(found) == 1 else NEITHER if found else UNKNOWN

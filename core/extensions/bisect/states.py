@@ -1,4 +1,4 @@
-"""The state of each release: installed, run and kept, so that a search goes on where it stopped."""
+"""The state of each release: installed, run and kept, so a stopped search goes on later."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class States:
     """The states of releases, each found once.
 
     Attributes:
-        found: state by release; None for one that cannot be installed.
+        found: state by release; None if it cannot be installed.
         reasons: why not, by release.
-        seconds: time that each run took [s].
+        seconds: time of each run [s].
     """
 
     releases: list[str]
@@ -98,12 +98,12 @@ class States:
         return Done(problem=f"its process ended with status {status}: {' '.join(last)[:300]}")
 
     def _reader(self, python: str) -> Signature:
-        """Return what the simulator's own reader makes of a file, if the engine has a probe."""
+        """Return the numbers of the simulator's own reader, if the engine has a probe."""
         probe = probe_of(self.task.engine)
         if probe is None:
             return {}
         status, said = run([python, "-P", str(probe), "--read"], self.task.timeout)
-        if status:
+        if status or not said.strip():
             last = " ".join(said.strip().splitlines()[-1:])[:300]
             return {READER: Answer("error", last, runs=False)}
         return {READER: answer_of_reader(json.loads(said.splitlines()[-1]))}
@@ -140,7 +140,7 @@ class States:
 
 
 def probe_of(engine: str) -> Path | None:
-    """Return the script that prints an engine's own numbers, without kincheck; None without one."""
+    """Return the script for an engine's own numbers without kincheck; None without one."""
     path = Path(__file__).parent / "probes" / f"{file_name(engine.partition('-')[0])}.py"
     return path if path.is_file() else None
 

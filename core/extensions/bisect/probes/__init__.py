@@ -1,1 +1,1 @@
-"""Scripts that print a simulator's own numbers without kincheck, named after its engine."""
+"""Scripts for a simulator's own numbers without kincheck, named after its engine."""

@@ -1,7 +1,7 @@
 """MuJoCo's own numbers, without kincheck.
 
-python probe.py --read              what its compiler makes of inertias and limits in a file
-python probe.py --model             that file
+python probe.py --read              inertias and limits of a file, compiled
+python probe.py --model             this file
 python probe.py MODEL.xml OUT.npz   all fields of model and data at one state
 """
 
@@ -61,9 +61,7 @@ SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def read() -> dict[str, Any]:
-    """Return what MuJoCo makes of the file by name: its numbers, those of the file, and the largest
-    accepted difference.
-    """
+    """Return, by name, MuJoCo's numbers, those of the file, and the largest accepted difference."""
     mujoco: Any = import_module("mujoco")
     m, truth = mujoco.MjModel.from_xml_string(model()), inertias()
     found: list[Any] = []
