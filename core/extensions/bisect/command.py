@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -100,6 +101,7 @@ class Bisect(Command):
         )
         states = States(row, task, releases.Environments(package, 1e9 * self.disk))
         found: list[Change] = []
+        again = ["kincheck", "bisect", self.engine, *self.cases, "--package", package]
         try:
             for i, j in changes(
                 len(row), states, lambda a, b: bool(differences(a, b, ends)), every=self.every
@@ -115,6 +117,7 @@ class Bisect(Command):
                     kind="result" if "result" in kinds else "interface",
                     cases=differing,
                     right=right_of(differing.values()),
+                    repeat=shlex.join([*again, "--from", row[i], "--to", row[j]]),
                 )
                 found.append(with_fields(change, states, self.out))
         except KeyboardInterrupt:

@@ -8,7 +8,7 @@ from ...errors import number_of
 from ...harness.labels import number
 from ...report.sections import Report, Section
 from ...unit_text import value_text
-from .results import UNKNOWN, Bisection, CaseChange, Change
+from .results import NEITHER, UNKNOWN, Bisection, CaseChange, Change
 from .signature import IDLE, TRUTHS, Signature
 from .states import counts
 
@@ -22,6 +22,11 @@ def report(found: Bisection, states: Mapping[str, Signature | None]) -> Report:
         f"{change.reproducer}/README.md" if change.reproducer else ""
         for change in found.changes
         for _ in change.cases
+    ]
+    worse = [
+        each.right in (change.earlier, NEITHER)
+        for change in found.changes
+        for each in change.cases.values()
     ]
     first, last = found.ends
     none = f"No change between {first} and {last}." if len(found.tried) > 1 else ""
@@ -46,6 +51,7 @@ def report(found: Bisection, states: Mapping[str, Signature | None]) -> Report:
                 4,
                 tables,
                 links=links,
+                wrong=[place for place, bad in enumerate(worse) if bad],
             ),
             Section(
                 "Releases",

@@ -49,6 +49,7 @@ class Change(msgspec.Struct, frozen=True, kw_only=True, rename={"earlier": "from
     Attributes:
         right: the release in agreement with the truth of its cases; "neither", or "unknown".
         field: the simulator's first differing field, in the order of computation.
+        repeat: command that compares these two alone.
         reproducer: folder below --out to repeat it without kincheck.
     """
 
@@ -57,6 +58,7 @@ class Change(msgspec.Struct, frozen=True, kw_only=True, rename={"earlier": "from
     kind: Kind
     cases: dict[str, CaseChange]
     right: str
+    repeat: str
     field: str | None = None
     reproducer: str | None = None
 
