@@ -147,10 +147,18 @@ if not TYPE_CHECKING:  # type checkers would take any name for one of these
         """Import a name on first use: pytest loads its plugins at every start and must not wait for
         numpy.
         """
-        if name not in _MODULES:
+        if name in _MODULES:
+            found = getattr(import_module(f".{_MODULES[name]}", __name__), name)
+        elif not name.startswith("_") and (offer := _offered(name)):
+            found = offer.load()
+        else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        found = globals()[name] = getattr(import_module(f".{_MODULES[name]}", __name__), name)
+        globals()[name] = found
         return found
+
+    def _offered(name: str) -> Any:
+        """Return what an extension offers under a public name; see `doors`."""
+        return import_module(".doors", __name__).offers("public").get(name)
 
 
 def __dir__() -> list[str]:

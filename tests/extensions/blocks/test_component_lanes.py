@@ -348,7 +348,7 @@ def test_chain_passes_links_in_line():
 @pytest.mark.parametrize("name", ["kite", "four_bar_in_one_step"])
 def test_components_stop_at_narrow_gap(name):
     """The sample is beyond a gap, or a corner, of less than a thousandth of the step."""
-    case = load_case(File(__file__).parents[1] / "data" / "stress" / f"{name}.toml")
+    case = load_case(File(__file__).parents[2] / "data" / "stress" / f"{name}.toml")
     path = case.sweep.path
     found, expected = with_one_program(Method.BY_COMPONENTS, case.mechanism, path, case.points)
     if expected.solved.all():

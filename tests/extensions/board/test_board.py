@@ -22,7 +22,7 @@ from kincheck.core.extensions.board.truth import truth_of
 from kincheck.core.extras import python_of
 from msgspec.structs import replace as replace_row
 
-DATA = Path(__file__).parents[1] / "data"
+DATA = Path(__file__).parents[2] / "data"
 FOUR_BAR = DATA / "free_four_bar.toml"
 
 

@@ -19,7 +19,7 @@ from kincheck.core.mechanism.loads import Bushing
 
 from ...support.engine_motion import SIMULATORS, installed
 
-DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
+DATA = Path(__file__).parents[2] / "data" / "elastokinematics"
 STRUT = json.loads((DATA / "5_strut_kc.json").read_text())
 AXLE = json.loads((DATA / "8_hmmwv_axle.json").read_text())
 AXLE_CASE = DATA / "8_hmmwv_axle.toml"

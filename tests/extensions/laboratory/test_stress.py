@@ -46,7 +46,7 @@ from ...support.fakes import Fake, native_but, raising
 NATIVE = engine("native")
 # Of a family whose specimens are of one kind, few show it.
 FEWER = {"loops": 3, "folds": 3}
-STRESS_FILES = sorted((Path(__file__).parents[1] / "data" / "stress").glob("*.toml"))
+STRESS_FILES = sorted((Path(__file__).parents[2] / "data" / "stress").glob("*.toml"))
 
 
 def test_stress_corner_beside_small_loop():

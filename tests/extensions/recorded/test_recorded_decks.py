@@ -10,7 +10,7 @@ from kincheck.adapters import engine
 
 from ...adams_decks import BODY, DECKS, mechanism_of, results
 
-DATA = Path(__file__).parent.parent / "data" / "recordings"
+DATA = Path(__file__).parents[2] / "data" / "recordings"
 NATIVE = engine("native")
 RATES = "vx vy vz wx wy wz ax ay az bx by bz"
 HEADS = ("time x y z e0 e1 e2 e3 " + RATES).split()

@@ -15,7 +15,7 @@ from scipy.io import savemat
 
 from ...support.case_texts import write
 
-DATA = Path(__file__).parent.parent / "data" / "recordings"
+DATA = Path(__file__).parents[2] / "data" / "recordings"
 NATIVE = engine("native")
 CASE = DATA / "fourbar.toml"
 PARTS = {"PART_2": "crank", "PART_3": "coupler", "PART_4": "rocker"}

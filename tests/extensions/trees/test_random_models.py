@@ -30,7 +30,7 @@ from ...support.written_again import GRID, written_again
 if importlib.util.find_spec("pxr") is None:
     FORMATS = {kind: write for kind, write in FORMATS.items() if kind != "USD"}
 MODELS = int(os.environ.get("KINCHECK_MODELS", "2"))
-DATA = Path(__file__).parents[1] / "data" / "hardpoints"
+DATA = Path(__file__).parents[2] / "data" / "hardpoints"
 ADAMS = (DATA / "adams_front_suspension.sub").read_text()
 CHRONO = sorted(DATA.glob("chrono_*.json"))
 
