@@ -48,11 +48,6 @@ class Bisect(Command):
         metavar="V",
         several="together",
     )
-    mode: str | None = option(
-        "mode of the engine; default: projection if it has this",
-        choices=("projection", "simulate"),
-        default=None,
-    )
     timeout: float = option(
         "limit for a case, and for the import of a release; default %(default)g",
         positive,
@@ -96,9 +91,7 @@ class Bisect(Command):
         row = releases.between(known, *ends)
         pairs = [(case, _with_reactions(case)) for case in cases]
         native = [_native(registry, each) for each in zip(*pairs, strict=True)]
-        task = Task(
-            self.engine, self.mode, package, pairs, (native[0], native[1]), TOL, self.timeout
-        )
+        task = Task(self.engine, package, pairs, (native[0], native[1]), TOL, self.timeout)
         states = States(row, task, releases.Environments(package, 1e9 * self.disk))
         found: list[Change] = []
         again = ["kincheck", "bisect", self.engine, *self.cases, "--package", package]

@@ -33,7 +33,6 @@ class Task:
     """
 
     engine: str
-    mode: str | None
     package: str
     cases: Sequence[tuple[Case, Case]]
     native: tuple[Sequence[Record], Sequence[Record]]
@@ -87,7 +86,7 @@ def solved(task: Task) -> Done:
     known = registry()
     # an import that never ends stops here
     faulthandler.dump_traceback_later(task.timeout, exit=True)
-    engines = known.find_engines([task.engine], problems, task.mode)
+    engines = known.find_engines([task.engine], problems)
     faulthandler.cancel_dump_traceback_later()
     refuse(problems)
     solver = in_workers(1, Limits(timeout=task.timeout))

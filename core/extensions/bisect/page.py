@@ -90,7 +90,8 @@ def says(change: Change) -> str:
     name = f"{change.earlier} → {change.later}"
     if change.kind == "interface":
         stops = cases[0].outcomes[1] in {each.value for each in IDLE}
-        release, message = (change.earlier, change.later)[stops], cases[0].messages[stops]
+        release = (change.earlier, change.later)[stops]
+        message = " ".join(cases[0].messages[stops].split())
         return (
             f"{name}: interface changed. {release} does not run"
             f" {number_of(len(cases), 'case')}: {message}"

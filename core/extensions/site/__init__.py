@@ -2,4 +2,4 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, commands={"site": "command:BuildSite"})
+EXTENSION = Extension(__name__, needs=["bisect", "board"], commands={"site": "command:BuildSite"})

@@ -1,86 +1,25 @@
-"""The documents below a folder: runs, searches over releases, boards; only the keys of the page."""
+"""The documents below a folder: runs, searches over releases, boards."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import msgspec
 
 from ...errors import KincheckError
-
-
-class Change(msgspec.Struct, frozen=True, rename={"earlier": "from", "later": "to"}):
-    """A change between two releases."""
-
-    earlier: str
-    later: str
-    kind: str
-    cases: dict[str, Any]
-    right: str
-    repeat: str
-    field: str | None = None
-    reproducer: str | None = None
-
-
-class Bisection(msgspec.Struct, frozen=True, tag_field="schema", tag="kincheck-bisect/1"):
-    """A search over releases."""
-
-    engine: str
-    package: str
-    ends: tuple[str, str]
-    changes: list[Change]
-    tried: list[str]
-    command: str
-
-
-class Step(msgspec.Struct, frozen=True):
-    """One run of a stepper."""
-
-    error: float | None = None
-
-
-class Row(msgspec.Struct, frozen=True):
-    """A row of the board."""
-
-    case: str
-    engine: str
-    integrator: str
-    column: str
-    state: str
-    version: str = ""
-    folder: str = ""
-    message: str = ""
-    runs: list[Step] = []
-
-
-class Board(msgspec.Struct, frozen=True, tag_field="schema", tag="kincheck-board/1"):
-    """A board."""
-
-    rows: list[Row]
-
-
-class Record(msgspec.Struct, frozen=True):
-    """A pair of case and engine."""
-
-    case: str
-    engine: str
-    mode: str
-    outcome: str
-    version: str | None = None
-    message: str = ""
-    us_per_step: float | None = None
-
-
-class Results(msgspec.Struct, frozen=True, tag_field="schema", tag="kincheck-results/1"):
-    """A run."""
-
-    records: list[Record]
-
+from ...harness.record import Results
+from ..bisect.results import Bisection
+from ..board.results import Board
 
 Document: TypeAlias = Bisection | Board | Results
-KNOWN = b"kincheck-bisect/1", b"kincheck-board/1", b"kincheck-results/1"
+KINDS: dict[bytes, type[Document]] = {
+    b'"kincheck-bisect/1"': Bisection,
+    b'"kincheck-board/1"': Board,
+    b'"kincheck-results/1"': Results,
+}
 HEAD = 200
+"""Bytes at the start of a document with its schema."""
 
 
 def documents(folder: Path) -> list[tuple[Path, Document]]:
@@ -90,13 +29,16 @@ def documents(folder: Path) -> list[tuple[Path, Document]]:
         KincheckError: a document is damaged.
     """
     found: list[tuple[Path, Document]] = []
-    for file in sorted(folder.rglob("*.json")):
+    # a row of the board is in board.json too
+    for file in sorted({*folder.rglob("*.json")} - {*folder.rglob("row.json")}):
         text = file.read_bytes()
-        if not any(b'"%s"' % schema in text[:HEAD] for schema in KNOWN):
-            continue
-        try:
-            document = msgspec.json.decode(text, type=Document)
-        except msgspec.MsgspecError as error:
-            raise KincheckError(f"{file}: {error}. Write the file again, or remove it.") from None
-        found.append((file.relative_to(folder), document))
+        for schema, kind in KINDS.items():
+            if schema not in text[:HEAD]:
+                continue
+            try:
+                found.append((file.relative_to(folder), msgspec.json.decode(text, type=kind)))
+            except msgspec.MsgspecError as error:
+                raise KincheckError(
+                    f"{file}: {error}. Write the file again, or remove it."
+                ) from None
     return found

@@ -9,10 +9,12 @@ from pathlib import Path
 
 from ...errors import number_of
 from ...harness.labels import number, product
-from ...harness.record import Outcome
+from ...harness.record import Outcome, Results
 from ...report.sections import Report, Section
 from ...version import VERSION
-from .documents import Bisection, Board, Document, Results
+from ..bisect.results import NEITHER, Bisection
+from ..board.results import Board
+from .documents import Document
 
 Line = tuple[tuple[str, ...], str, bool]
 """Cells of a row, its link, and whether it is wrong."""
@@ -22,7 +24,7 @@ COLUMNS: Mapping[str, Sequence[str]] = {
     "Runs": ("engine", "release", "outcome", "cases", "repeat by"),
     "Board": ("case", "stepper", "release", "outcome", "error [m]"),
     "Speed": ("case", "engine", "release", "us/step"),
-    "Pages": ("page",),
+    "Pages": ("kind", "page"),
 }
 LABELS = {"Board": 4, "Speed": 3}
 PAGES = "findings", "gallery", "benchmarks"
@@ -72,7 +74,7 @@ def _changes(folder: Path, path: Path, found: Bisection) -> Iterator[Line]:
     for each in found.changes:
         name = f"{found.package} {each.earlier} → {each.later}"
         made = f"{path.parent / each.reproducer}/README.md" if each.reproducer else page
-        worse = each.kind == "result" and each.right in (each.earlier, "neither")
+        worse = each.kind == "result" and each.right in (each.earlier, NEITHER)
         link = made if (folder / made).is_file() else str(path)
         cells = (each.kind, ", ".join(each.cases), each.right, each.field or "", each.repeat)
         yield (found.engine, name, *cells), link, worse
@@ -84,16 +86,16 @@ def _changes(folder: Path, path: Path, found: Bisection) -> Iterator[Line]:
 
 def _runs(path: Path, found: Results) -> Iterator[Line]:
     """Yield the cases of each engine and outcome."""
-    groups: dict[tuple[str, str, str], list[str]] = {}
+    groups: dict[tuple[str, str, Outcome], list[str]] = {}
     for each in found.records:
         key = product(each.engine, each.mode), each.version or "", each.outcome
         groups.setdefault(key, []).append(each.case)
     for (engine, version, outcome), cases in groups.items():
-        bad = Outcome(outcome).bad
+        bad = outcome.bad
         names = ", ".join(cases) if bad else number_of(len(cases), "case")
         repeat = f"kincheck run {' '.join(cases)} --engine {engine.partition(' ')[0]}" * bad
         link = str(path.with_name("report.html"))
-        yield (engine, version, Outcome(outcome).shown, names, repeat), link, bad
+        yield (engine, version, outcome.shown, names, repeat), link, bad
 
 
 def _speed(path: Path, found: Results) -> Iterator[Line]:
@@ -107,10 +109,9 @@ def _speed(path: Path, found: Results) -> Iterator[Line]:
 def _board(path: Path, found: Board) -> Iterator[Line]:
     for each in found.rows:
         error = number(each.runs[-1].error if each.runs else None)
-        stepper = f"{each.engine} {each.integrator}, {each.column}"
         link = str(path.parent / each.folder / "run.py") if each.folder else str(path)
         bad = each.state in ("timeout", "crashed")
-        yield (each.case, stepper, each.version, each.state, error), link, bad
+        yield (each.case, each.name, each.version, each.state, error), link, bad
 
 
 def _pages(folder: Path) -> Iterator[Line]:
@@ -119,4 +120,4 @@ def _pages(folder: Path) -> Iterator[Line]:
         for file in sorted(folder.glob(f"docs/{name}/**/index.html")):
             title = re.search(r"<title>(.*?)( - kincheck)?</title>", file.read_text("utf-8"), re.S)
             text = html.unescape(title[1]).strip() if title else file.parent.name
-            yield (text,), str(file.relative_to(folder)), False
+            yield (name, text), str(file.relative_to(folder)), False

@@ -95,9 +95,13 @@ def fields(file: str) -> dict[str, Any]:
                 values = np.asarray(getattr(part, name, None), dtype=float)
             except (TypeError, ValueError):
                 continue
-            if values.size and np.isfinite(values).any():
+            # which constraints form an island is not a number of the motion
+            if values.size and np.isfinite(values).any() and "island" not in name:
                 found[name] = values
-    return found
+    rates = np.zeros((m.nbody, 6, m.nv))
+    for body, rows in enumerate(rates):
+        mujoco.mj_jacDot(m, d, rows[:3], rows[3:], d.xipos[body], body)
+    return {**found, "mj_jacDot": rates}
 
 
 def main(first: str, out: str = "") -> None:
