@@ -1,0 +1,79 @@
+"""Doors: extensions of folders and of other packages, what they need and what they offer."""
+
+import sys
+from importlib.metadata import EntryPoint
+
+import pytest
+from kincheck.core import KincheckError, doors
+from kincheck.core.cli.main import main
+
+from .docs.page import blocks
+from .support.sources import EXTENSIONS, ROOT
+
+PAGE = ROOT / "docs/pages/how-to/own-extension.md"
+
+
+@pytest.fixture
+def fresh():
+    """Extensions and entry points are read again, before and after the test."""
+    for each in (doors.extensions, doors.entry_points):
+        each.cache_clear()
+    yield
+    for each in (doors.extensions, doors.entry_points):
+        each.cache_clear()
+
+
+@pytest.fixture
+def installed(fresh, tmp_path, monkeypatch):
+    """The package of the page, as its pyproject.toml installs it."""
+    for block in blocks(PAGE.read_text(encoding="utf-8")):
+        if block.title:
+            file = tmp_path / block.title
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(block.text, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    point = EntryPoint("bodies", "kincheck_bodies:EXTENSION", doors.GROUP)
+    monkeypatch.setattr(doors, "entry_points", lambda group: {point.name: point})
+    yield
+    for name in [name for name in sys.modules if name.startswith("kincheck_bodies")]:
+        del sys.modules[name]
+
+
+def test_extension_of_page_adds_command(installed, capsys):
+    assert main(["bodies", "rssr"]) == 0
+    assert capsys.readouterr().out == "crank moves\nrocker moves\n"
+
+
+def test_every_folder_is_an_extension():
+    assert {each.name for each in EXTENSIONS} == {*doors.extensions()}
+
+
+def test_every_offer_can_be_loaded():
+    kinds = [name for name, value in vars(doors.Extension("x")).items() if isinstance(value, dict)]
+    offered = {kind: doors.offers(kind) for kind in kinds if kind != "formats"}
+    assert len(offered["commands"]) > 10
+    assert all(each.load() is not None for kind in offered.values() for each in kind.values())
+
+
+def test_extension_without_its_needs_is_absent(fresh, monkeypatch):
+    """Also one that needs it over another."""
+    chain = [("a", ["gone"]), ("b", ["a"]), ("c", [])]
+    found = [doors.Extension(f"x.{name}", needs=needs) for name, needs in chain]
+    monkeypatch.setattr(doors, "_of_folders", lambda: found)
+    monkeypatch.setattr(doors, "entry_points", lambda group: {})
+    assert [*doors.extensions()] == ["c"]
+
+
+def test_two_extensions_of_one_name(fresh, monkeypatch):
+    point = EntryPoint("trace", "x:EXTENSION", doors.GROUP)
+    monkeypatch.setattr(doors, "entry_points", lambda group: {point.name: point})
+    with pytest.raises(KincheckError, match=r"Two extensions are named 'trace'\. Rename"):
+        doors.extensions()
+
+
+def test_two_offers_of_one_name(fresh, monkeypatch):
+    found = [doors.Extension(f"x.{name}", commands={"move": "a:A"}) for name in "ab"]
+    monkeypatch.setattr(doors, "_of_folders", lambda: found)
+    monkeypatch.setattr(doors, "entry_points", lambda group: {})
+    with pytest.raises(KincheckError, match="a and b both offer 'move' under commands"):
+        doors.offers("commands")
