@@ -64,8 +64,9 @@ def shadow_of(package: str) -> str:
         name = module.name.partition(".")[0]
         if str(module.parent) in folders and own.suffix in (".py", ".so", ".pyd"):
             spec = importlib.util.find_spec(name) if name.isidentifier() else None
-            if spec and spec.origin and os.path.realpath(spec.origin) != str(own):
-                return spec.origin
+            found = os.path.realpath(spec.origin) if spec and spec.origin else str(own)
+            if not Path(found).is_relative_to(module.parent):
+                return found
     return ""
 
 
