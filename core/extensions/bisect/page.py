@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ...errors import number_of
-from ...harness.labels import number
+from ...harness.labels import against, number
 from ...report.sections import Report, Section
 from ...unit_text import value_text
 from .results import NEITHER, UNKNOWN, Bisection, CaseChange, Change
@@ -105,12 +105,9 @@ def says(change: Change) -> str:
 def _verdict(change: Change, cases: list[CaseChange]) -> str:
     if change.right == UNKNOWN:
         return "No truth of the cases says who is right."
-    against = {
-        curve.against.replace("_", " ")
-        for each in cases
-        for curve in each.curves
-        if curve.against in TRUTHS
+    standards = {
+        against(curve.against) for each in cases for curve in each.curves if curve.against in TRUTHS
     }
-    by = f" by {' and '.join(sorted(against))}" if against else ""
+    by = f" by {' and '.join(sorted(standards))}" if standards else ""
     right = change.right if change.right in (change.earlier, change.later) else "Neither"
     return f"{right} is right{by}."

@@ -17,7 +17,7 @@ from ...trajectory import QUANTITIES, Array
 from ...unit_text import motion_word
 from .results import NEITHER, UNKNOWN, CaseChange, CurveChange
 
-READER, FILE = "reader", "file"
+READER, FILE = "reader", "the file"
 """Case of a simulator's own reader, and its truth: the numbers in the file."""
 
 TRUTHS = {FILE, *(each.value for each in Truth if each is not Truth.CONSENSUS_ONLY)}

@@ -60,6 +60,7 @@ def test_twelve_releases_name_their_changes(offline):
     assert document["tried"] == ["9.0", "11.0", "12.0"]
 
 
+@pytest.mark.nightly
 def test_undone_change_is_found_by_every(offline, capsys):
     for release in range(1, 6):
         text = engine(offset=1e-6 * (release == 3))
@@ -163,6 +164,7 @@ def test_interrupted_search_goes_on(offline, capfd):
     assert "1.0: 1 pass, kept from before" in capfd.readouterr().err
 
 
+@pytest.mark.nightly
 def test_disk_limit_removes_longest_unused(offline):
     for release in (1, 2, 3):
         wheel(offline / "wheels", f"{release}.0", engine())
