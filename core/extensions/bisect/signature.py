@@ -158,13 +158,14 @@ def _right(
     curves: Sequence[CurveChange], answers: tuple[Answer, Answer], names: Sequence[str]
 ) -> str:
     """Return who is right by the truth of the changed curves; without one, nobody is known to be.
-    If only the outcome has changed, a pass is right.
+    Native completes a truth without rates. If only the outcome has changed, a pass is right.
     """
-    decided = [each for each in curves if each.against in TRUTHS]
+    judged = all(each.judged for each in answers)
+    decided = [each for each in curves if each.against in TRUTHS] or (curves if judged else [])
     if decided:
         pairs = [[e is not None and e <= each.tolerance for e in each.errors] for each in decided]
         right = [all(column) for column in zip(*pairs, strict=True)]
-    elif not curves and all(each.judged for each in answers):
+    elif judged:
         right = [each.outcome == Outcome.PASS.shown for each in answers]
     else:
         return UNKNOWN

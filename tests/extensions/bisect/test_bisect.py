@@ -125,6 +125,16 @@ def test_nobody_is_right_without_truth(offline):
     assert ends(document) == [("2.0", "3.0", "result", "neither")]
 
 
+def test_native_completes_truth_without_rates(offline):
+    case(offline, "places", columns=2)
+    for release in (1, 2):
+        wheel(offline / "wheels", f"{release}.0", engine(term=float(release < 2)))
+    status, document = found("places.toml", "--from", "1.0", "--to", "2.0")
+    assert (status, ends(document)) == (1, [("1.0", "2.0", "result", "1.0")])
+    (change,) = document["changes"][0]["cases"].values()
+    assert [each["against"] for each in change["curves"]] == ["native"]
+
+
 BAD = (
     (("wobble", "--from", "1", "--to", "2"), "Name the package of the engine by --package"),
     ((*WOBBLE[1:], "--from", "2.0", "--to", "1.0"), "Give the earlier first"),

@@ -101,15 +101,19 @@ why = "round-off"
 """
 
 
-def case(folder, name="crank", truth="closed_form"):
-    """Write the file of a crank; its table has velocities and accelerations."""
+HEADS = "turn,x,x.velocity,x.acceleration"
+
+
+def case(folder, name="crank", truth="closed_form", columns=4):
+    """Write the file of a crank; its table has so many columns, rates last."""
     text = CASE.format(name=name, truth=truth)
     if truth != "consensus_only":
         rows = [
             f"{t},{0.5 * cos(t)!r},{-0.5 * sin(t)!r},{-0.5 * cos(t)!r}"
             for t in (0.0, 0.25, 0.5, 0.75, 1.0)
         ]
-        (folder / f"{name}.csv").write_text("\n".join(["turn,x,x.velocity,x.acceleration", *rows]))
+        lines = [",".join(each.split(",")[:columns]) for each in (HEADS, *rows)]
+        (folder / f"{name}.csv").write_text("\n".join(lines))
         text += f'[reference]\nfile = "{name}.csv"\n'
     path = folder / f"{name}.toml"
     path.write_text(text)
