@@ -1,15 +1,18 @@
 """kincheck bisect on releases of a small simulator, offline: wheels that the tests make."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from math import log2
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.bisect.inside import shadow_of
 from kincheck.core.extensions.bisect.search import changes
 
 from .wheels import case, engine, twelve, wheel
@@ -181,6 +184,20 @@ def test_disk_limit_removes_longest_unused(offline):
     found("crank.toml", "--from", "1.0", "--to", "3.0", "--every", "--disk", "1e-9")
     left = [each.name.split("-")[2] for each in offline.glob("environments/bisect/*")]
     assert left == ["3.0"]
+
+
+def test_other_copy_of_release_is_found(tmp_path, monkeypatch):
+    """A release whose module is loaded from elsewhere must not be taken for it."""
+    own, other = tmp_path / "own", tmp_path / "other"
+    wheel(tmp_path, "1.0", engine())
+    with ZipFile(next(tmp_path.glob("*.whl"))) as file:
+        file.extractall(own)
+    other.mkdir()
+    monkeypatch.syspath_prepend(str(own))
+    assert shadow_of("wobble-sim") == ""
+    shutil.copy(own / "wobble_sim.py", other)
+    monkeypatch.syspath_prepend(str(other))
+    assert shadow_of("wobble-sim") == str(other / "wobble_sim.py")
 
 
 @pytest.mark.parametrize("states", ["aaaab", "abbbb", "aabbc", "a-ab-b", "aaaa", "-ab-", "abcde"])
