@@ -305,6 +305,8 @@ def _weights(smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tu
             sign = 1.0 if op == "max" else -1.0
             first = where_larger(a - b + 1.0, a - b - 1.0, 0.5 + 0.5 * sign, 0.5 - 0.5 * sign)
             return first, 1.0 - first
+        case "larger" if smooth:  # it selects coefficients, which are constants of a piece
+            return 0.0, 0.0
         case _:
             raise TypeError(
                 f"operation {op!r} has a kink and no derivative; leave it out of equations to be"
@@ -318,8 +320,9 @@ def jacobian(
     """Return the derivatives of each value by the inputs, without zeros.
 
     Args:
-        smooth: "min" and "max" are parts of smooth functions, such as the pieces of a curve; at the
-            kink itself, where they need a derivative of one side, it is that of the second operand.
+        smooth: "min" and "max" are parts of smooth functions, such as the pieces of a curve, and
+            "larger" selects a piece; at the kink itself, where they need a derivative of one side,
+            it is that of the second operand.
 
     Raises:
         TypeError: a value depends on an input through an operation with a kink ("abs", "min",

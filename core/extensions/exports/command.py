@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -66,16 +67,21 @@ class Export(OfCase):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
+        from ...report.progress import complain
         from .model_writer import written
 
         writer = writer_of(self.to)
         case = registry.case_of(self, driven=False)
-        keep_texts(
-            written(case, writer, driver_value(self.at, case)),
-            case.name,
-            self.out,
-        )
+        texts = written(case, writer, driver_value(self.at, case))
+        keep_texts(texts, case.name, self.out)
+        complain(f"note: left out: {each}" for each in _left_out(texts))
         return Status.WITHIN
+
+
+def _left_out(texts: Mapping[str, str]) -> list[str]:
+    """Return what the comments of written files say that their format cannot hold."""
+    lines = " ".join(each.lstrip("# ") for text in texts.values() for each in text.splitlines())
+    return re.findall(r"Left out: (.+?)\.(?= |$)", lines)
 
 
 def keep_texts(
