@@ -16,7 +16,15 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from ..case.io.escape import visible
 from ..case.io.reader_options import CurveOptions, Supplied
-from ..errors import MOST_NAMED, KincheckError, SolveError, collect_errors, refuse, shortened
+from ..errors import (
+    MOST_NAMED,
+    KincheckError,
+    SolveError,
+    collect_errors,
+    labelled,
+    refuse,
+    shortened,
+)
 from ..harness.interrupts import hold, status_of, words_of
 from ..options import (
     CASES,
@@ -381,7 +389,7 @@ def _explanations(cases: Sequence[Case]) -> Iterator[str]:
             yield from explain(case)
         except SolveError as error:  # only this case fails: its records have the message too
             yield f"{case.name}: cannot be solved: {error}"
-        yield from (f"  note: {note}" for note in notes(case))
+        yield from (f"  {labelled(note)}" for note in notes(case))
 
 
 def _with_cases(options: Run, registry: Registry) -> Run:
@@ -505,7 +513,9 @@ def _open_history(
             return None, [f"{names}: {why}; the run is not in the history"]
         found = keep(Path(options.history), cases, engines, **about)
     except HistoryError as error:
-        return None, [f"{error}; the run is not in the history"]
+        from .destinations import not_in_history
+
+        return None, [not_in_history(options, error)]
     if options.resume:
         print(
             f"kincheck: run {found.run} is resumed after {len(found.made)} records"

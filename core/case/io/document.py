@@ -14,10 +14,10 @@ import re
 import reprlib
 import tomllib
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
@@ -256,16 +256,7 @@ def parse(file: Path, text: str) -> dict[str, Any]:
             f"line {line}",
             f"found a key nested more than {DEEPEST} deep, expected two or three parts; correct it",
         )
-    try:
-        data = json.loads(text, object_pairs_hook=_once) if is_json else tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-        problem = f"not valid {'JSON' if is_json else 'TOML'}: {what}; correct the syntax"
-        if what.startswith(_TOO_MANY_DIGITS):
-            problem = (
-                "found an integer of thousands of digits, expected numbers of a size; correct it"
-            )
-        raise fault(file, "", problem) from None
+    data = parse_json(file, text) if is_json else _loaded(file, "TOML", tomllib.loads, text)
     if not isinstance(data, dict):
         raise fault(
             file, "", f"found {shown(data)}, expected the keys of a case; write an object {{...}}"
@@ -273,6 +264,31 @@ def parse(file: Path, text: str) -> dict[str, Any]:
     tables = cast("dict[str, Any]", data)
     check_values(file, tables)
     return tables
+
+
+def parse_json(file: Path, text: str, **hooks: Callable[[str], object]) -> Any:
+    """Return the value of a JSON text.
+
+    Args:
+        hooks: of `json.loads`, to read numbers in another way.
+
+    Raises:
+        CaseError: the syntax is wrong, or a key is given twice.
+    """
+    return _loaded(file, "JSON", partial(json.loads, object_pairs_hook=_once, **hooks), text)
+
+
+def _loaded(file: Path, kind: str, load: Callable[[str], Any], text: str) -> Any:
+    try:
+        return load(text)
+    except (ValueError, RecursionError) as error:
+        what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        problem = f"not valid {kind}: {what}; correct the syntax"
+        if what.startswith(_TOO_MANY_DIGITS):
+            problem = (
+                "found an integer of thousands of digits, expected numbers of a size; correct it"
+            )
+        raise fault(file, "", problem) from None
 
 
 def _blank(found: re.Match[str]) -> str:
@@ -388,8 +404,13 @@ class Section:
         return Section(self.file, join(self.key, name), self._entries.get(name), self.units)
 
     def each(self) -> Iterator[tuple[str, Section]]:
-        """Yield names and values of this table; nothing without it."""
-        return ((name, self.at(name)) for name in self._entries)
+        """Yield names and values of this table; nothing without it.
+
+        Raises:
+            CaseError: the value is no table.
+        """
+        if self.value is not None:
+            yield from ((name, self.at(name)) for name in self.table)
 
     def fault(self, problem: str) -> CaseError:
         """Return the error of this value; see `fault`."""
@@ -406,6 +427,22 @@ class Section:
     def require(self, name: str | None, known: Iterable[str], expected: str) -> None:
         """Refuse a name here that is none of the known ones; see `require_known`."""
         require_known(self.file, self.key, name, known, expected)
+
+    def require_keys(self, known: Iterable[str]) -> None:
+        """Refuse unread keys of this table: almost always misspelt ones.
+
+        Raises:
+            CaseError: the value is no table, or has such a key.
+        """
+        known = [*known]
+        for name in self.table:
+            if name not in known:
+                close = similar(name, known)
+                advice = f"did you mean {close!r}?" if close else "remove it"
+                raise self.at(name).fault(
+                    f"unknown key, expected {'one of ' * (len(known) > 1)}{', '.join(known)};"
+                    f" {advice}"
+                )
 
     @property
     def table(self) -> dict[str, Any]:
@@ -452,14 +489,9 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
         CaseError: not a table, an unknown key, a missing key, or a value of another type or shape
             than described.
     """
-    table = Section(file, key, value).table
-    fields = _fields(struct)
-    for name in table:
-        if name not in fields:
-            close = similar(name, fields)
-            advice = f"did you mean {close!r}?" if close else "remove it"
-            problem = f"unknown key, expected one of {', '.join(fields)}; {advice}"
-            raise fault(file, join(key, name), problem)
+    section, fields = Section(file, key, value), _fields(struct)
+    section.require_keys(fields)
+    table = section.table
     for name, field in fields.items():
         if field.required and name not in table:
             raise fault(

@@ -257,6 +257,7 @@ def samples_of(
         # convert at once: the cells of a large file as texts would take many times its size
         for column, n in zip(printed, wanted, strict=True):
             if gaps and str(cells[n]).lower().lstrip("+-") in ("", "nan"):
+                column.add("")
                 numbers.append(math.nan)
                 continue
             text = numeral(cells[n], sign)

@@ -106,7 +106,8 @@ def _gravity(dataset: Dataset, units: Units) -> Vector:
 
 def _source(dataset: Dataset) -> str:
     """Return the source of the case, with all omissions."""
-    counted = [f"{kind} ({count})" for kind, count in sorted(dataset.left_out.items())]
+    left = {**dataset.left_out, **dataset.unread()}
+    counted = [f"{kind} ({count})" for kind, count in sorted(left.items())]
     left_out = shortened(counted, _MOST_NAMED) or "nothing"
     title = dataset.title[:_LONGEST_TITLE]
     return f"Adams dataset {title!r} of {dataset.file.name}{LEFT_OUT}{left_out}"

@@ -13,7 +13,7 @@ from ...case.io.reader_options import HARDPOINTS, Supplied
 from ...cli import shared_options
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import TOL, Isolated
-from ...errors import KincheckError, refuse
+from ...errors import KincheckError, labelled, refuse
 from ...options import (
     argument,
     destination,
@@ -141,7 +141,9 @@ class MeasureCompliance(Isolated):
             print(*views.lines(results), sep="\n", file=console.file)
             if checked is not None:
                 print_table(checked, console.file, reactions=True)
-            complain(f"note: {note}" for note in (*case.assembly, *results.travel.notes))
+            every = results.travel, *results.loads.values()
+            notes = (*case.assembly, *(note for each in every for note in each.notes))
+            complain(labelled(note) for note in dict.fromkeys(notes))
         named = [each.name for each in engines if each.name != STANDARD]
         problems += views.failures(results)
         problems += missing_requirements(checked, (), named) if checked else []
@@ -186,7 +188,9 @@ class MeasureCompliance(Isolated):
                     resume=False,
                 )
             except HistoryError as error:
-                problems.append(f"{error}; the run is not in the history")
+                from ...cli.destinations import not_in_history
+
+                problems.append(not_in_history(self, error))
 
         def add(record: Record, done: int, total: int) -> None:
             if keeping is not None:

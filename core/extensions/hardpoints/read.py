@@ -286,9 +286,9 @@ def _fill_roles(
     named = _points_by_role(table)
     filled = dict[str, str]()
     if own is not None and not new:
-        filled |= _read_own_names(
-            own, [role.name for role in (*template.roles, *template.optional)], table.points
-        )
+        roles = [role.name for role in (*template.roles, *template.optional)]
+        filled |= _read_own_names(own, roles, table.points)
+    unnamed = own if not filled and not new else None
     for role in (*template.roles, *template.optional):
         if role.name in filled:
             continue
@@ -327,6 +327,10 @@ def _fill_roles(
         where = table.points[name].where if name else ""
         place = "" if where in (name, "") else f", {where}"
         lines.append(f"{role.name}, {role.meaning}" + f" (is it {name!r}{place}?)" * bool(name))
+    if unnamed is not None:
+        expected = f'expected lines such as {missing[0].name} = "NAME"'
+        problem = f"found no names, all lines are comments, {expected}"
+        raise fault(unnamed, "", f"{problem}; take the # away from lines that you fill in")
     problem = f"template {template.name}: missing {'; '.join(lines)}"
     advice = "say with --names FILE which point is which; a new FILE is written to be filled in"
     if new:

@@ -45,7 +45,7 @@ from .table import (
     twice,
     wanted_corner,
 )
-from .templates import ROLES, agree, compact, corner_of
+from .templates import ROLES, agree, compact, corner_of, head_of_corner
 from .tree import FEWEST, axis_of, fact_of, is_assignments, read_assignments
 
 COMMENTS = ("#", "%", "//")
@@ -60,7 +60,6 @@ _COLUMN = re.compile(
     r"(?:[-_ ]?(?:value|coord|coordinate|pos|position|koordinate))?"
     r"(?:\s*[\[(_/,]\s*([a-z]+)\s*[\])]?|\s+(?:in\s+)?([a-z]+))?"
 )
-_CORNERS = ("corner", "wheel", "wheelposition", "axle", "side", "location")
 _REMARKS = ("meaning", "remark", "remarks", "comment", "comments", "note", "notes", "description")
 _SIGNS = re.compile(rf"[{DELIMITERS}]+")
 
@@ -84,7 +83,7 @@ class Head:
     @property
     def of_corners(self) -> list[int]:
         """Indices of the columns whose names are those of corners, axles or sides."""
-        return [k for k, name in enumerate(self.names) if compact(name) in _CORNERS]
+        return [k for k, name in enumerate(self.names) if head_of_corner(name)]
 
     @property
     def others(self) -> list[str]:
@@ -418,7 +417,7 @@ def _as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
     if not {"x", "y", "z"} <= columns.keys():
         return None
     if "name" not in columns:  # the only column before the coordinates, under any name, or beside
-        before = [k for k in range(min(columns.values())) if compact(texts[k]) not in _CORNERS]
+        before = [k for k in range(min(columns.values())) if not head_of_corner(texts[k])]
         if len(before) != 1:
             before = [k for k in range(4) if k not in columns.values()]
             if before[0] != 3 or any(texts[3:]):  # below no name, at the end

@@ -63,6 +63,9 @@ _AXLES = [
     re.compile(rf"{axle}(?:_(?:left|{_OF}))?|(?:{_OF})_{axle}|{axle[0]}l?|l{axle[0]}")
     for axle in ("front", "rear")
 ]
+_UNIT_KEYS = ("unit", "units", "length_unit", "length_units", "length")
+_AXES_KEYS = ("axes", "coordinate_system", "frame", "axis_system")
+_TYPE_KEYS = ("type", "template", "suspension_type", "suspension")
 _NUMBER = r"[-+\u2212]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _ASSIGNED = re.compile(
     r"\s*(?:(?:const|let|var|static|final|double|set)\s+)*"
@@ -352,8 +355,8 @@ def _table(
     values = {leaf.keys: leaf.value for leaf in others}
     millimetres = length_name(facts.get("unit", "")) == "mm"
     found |= _wheel_points(found, values, millimetres=millimetres)
-    listed = [*left_out, *dropped]
-    if unused := [leaf.where for leaf in others if leaf.value not in facts.values()]:
+    listed, said = [*left_out, *dropped], [*facts.values()]
+    if unused := [leaf.where for leaf in others if not (_fact_key(leaf) and leaf.value in said)]:
         listed.append(f"values {shortened([brief(each) for each in unused], 8)}")
     return HardpointTable(
         *(file, tool, found, facts.get("unit"), facts.get("axes"), facts.get("template"), listed),
@@ -397,6 +400,12 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
     return points, others
 
 
+def _fact_key(leaf: Leaf) -> bool:
+    """Return whether a value has the key of a fact."""
+    key = normal(leaf.keys[-1]) if leaf.keys else ""
+    return key == "side" or any(key in keys for keys in (_UNIT_KEYS, _AXES_KEYS, _TYPE_KEYS))
+
+
 def _facts(others: Sequence[Leaf]) -> dict[str, str]:
     """Return unit, axes and template, if the tree names them."""
     facts = dict[str, str]()
@@ -404,14 +413,12 @@ def _facts(others: Sequence[Leaf]) -> dict[str, str]:
         if not leaf.keys or not isinstance(leaf.value, str):
             continue
         key, value = normal(leaf.keys[-1]), leaf.value.strip()
-        if key in ("unit", "units", "length_unit", "length_units", "length"):
+        if key in _UNIT_KEYS:
             if length_name(value) in LENGTHS or key != "length":
                 facts.setdefault("unit", value)
-        elif key in ("axes", "coordinate_system", "frame", "axis_system") and is_axes(value):
+        elif key in _AXES_KEYS and is_axes(value):
             facts.setdefault("axes", value)
-        elif key in ("type", "template", "suspension_type", "suspension") and (
-            compact(value) in TEMPLATE_NAMES
-        ):
+        elif key in _TYPE_KEYS and compact(value) in TEMPLATE_NAMES:
             facts.setdefault("template", value)
         elif key == "side" and value.lower() in ("left", "right"):
             facts.setdefault("side", value)

@@ -86,7 +86,8 @@ class Serve(Command):
             _measure_edits(read(), wanted)
             if self.no_browser:
                 return Status.WITHIN
-        server = self._server(registry, read, port=self.port, once=self.once)
+        how = {"port": self.port, "once": self.once, "measuring": wanted > 0}
+        server = self._server(registry, read, **how)
         try:
             address = server.address + f"&measure={wanted}" * bool(wanted)
             print(address, flush=True)

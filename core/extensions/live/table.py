@@ -29,7 +29,7 @@ from ...harness.trajectory_check import SAME_POSE
 from ...jet import Jet
 from ...kinematics import NativeSolver, PreparedDesigns, Variants, places, require_driven
 from ...mechanism.motions import Path as Way
-from ...program.llvm.compiler import available
+from ...program.llvm.machine_code import available
 from ...report.axis import DISPLAY, Axis, driver_axis
 from ...report.drawing import drawing
 from ...trajectory import Array

@@ -275,7 +275,7 @@ def _part(options: Sweep, folder: Path) -> Part:
 
     from ...cli.joint_loading import sources
     from ...harness.provenance import processor
-    from ...program.llvm.compiler import available
+    from ...program.llvm.machine_code import available
     from .chunk_files import Part
 
     facts: dict[str, Any] = {

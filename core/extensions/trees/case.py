@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +18,7 @@ from ...case.closing import within_digits
 from ...case.io.document import SMALLEST, explained, usable
 from ...case.io.outputs import with_all_motions
 from ...case.io.reader_options import LEFT_OUT, Supplied
-from ...errors import MechanismError, shortened
+from ...errors import WARNING, CaseError, MechanismError, shortened
 from ...joints import (
     Coupler,
     Distance,
@@ -41,6 +42,7 @@ from ...trajectory import Array
 from .assembly import Assembled, assemble
 from .driving import (
     KEYFRAME,
+    MOST_HELD,
     Driving,
     UndrivenMotions,
     choose_held,
@@ -49,6 +51,7 @@ from .driving import (
     read_start,
 )
 from .element import Names
+from .gluing import glue
 from .place import Place, coordinates, rotation_vector
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, sum_of_masses
 
@@ -75,19 +78,22 @@ def case_of(tree: Tree, supplied: Supplied) -> Case:
     return _Parts(*model_of(tree, supplied)).case()
 
 
-def undriven_mechanism(tree: Tree) -> tuple[Mechanism, Tree, set[str]]:
-    """Return the mechanism of a tree without drivers, the tree in its closed start, and its links
-    with a free turn about themselves.
+def undriven_mechanism(
+    tree: Tree,
+) -> tuple[Mechanism, Tree, set[str], Mapping[str, Sequence[str]]]:
+    """Return the mechanism of a tree without drivers, its loops closed and its halves glued, the
+    tree in its closed start, its links with a free turn about themselves, and the names of the
+    parts of each link.
 
     Raises:
         CaseError: its start does not close, or there is no joint for one of its ties.
     """
     model = assemble(read_start(tree, ()), None)
     spins = find_spins(model.tree, ())
-    whole = _Parts(model, Driving({}, (), ()), spins).mechanism()
+    whole, parts = glue(_Parts(model, Driving({}, (), ()), spins).mechanism(), tree.places)
     if not model.is_exact:
         whole = reduce_rows(whole, model.closing.tolerance, [*tree.joints]).mechanism
-    return whole, model.tree, {spin.move.inner for spin in spins.values()}
+    return whole, model.tree, {spin.move.inner for spin in spins.values()}, parts
 
 
 def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
@@ -108,12 +114,40 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
             driving, used = own, used + tree.motors
             model = replace(model, notes=(*model.notes, note))
     model = replace(model, tree=replace(model.tree, left_out=tree.left_out - used))
-    chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)
+    chosen, spins = _choose_held(model, driving, spins, hold_rest=supplied.hold_rest)
     rest = [name for name in chosen.held + chosen.fixed if name not in supplied.hold]
     if passive := [name for name in rest if name not in model.tree.actuated]:
-        note = f"held by --hold-rest, without a motor: {shortened(passive, MOST_NAMED)}"
+        note = (
+            f"{WARNING}held by --hold-rest, without a motor:"
+            f" {shortened(passive, MOST_NAMED)}; a loop that the file lacks would move them"
+        )
         model = replace(model, notes=(*model.notes, note))
     return model, chosen, spins
+
+
+def _choose_held(
+    model: Assembled, driving: Driving, spins: Mapping[str, Spin], *, hold_rest: bool
+) -> tuple[Driving, Mapping[str, Spin]]:
+    """Return the driven and held moves, and the links with a spin beside them.
+
+    A link between two balls is a rod, whose spin is no freedom. If --hold-rest cannot hold the rest
+    so, it holds the ball of such a link too, which is then no rod.
+
+    Raises:
+        CaseError: see `choose_held`.
+    """
+    axes = {name: spin.axis for name, spin in spins.items()}
+    try:
+        return choose_held(model, driving, axes, hold_rest=hold_rest), spins
+    except CaseError:
+        balls = [name for name, spin in spins.items() if spin.move.kind == "ball"]
+        if not (hold_rest and 0 < len(balls) <= MOST_HELD):
+            raise
+        tried = replace(driving, fixed=(*driving.fixed, balls[0]))
+        with suppress(CaseError):
+            left = find_spins(model.tree, tried.fixed)
+            return _choose_held(model, tried, left, hold_rest=True)
+        raise
 
 
 class _Parts:
@@ -343,6 +377,13 @@ class _Parts:
             try:
                 if len({*strut.links} & {GROUND, *self.bodies}) < 2:
                     raise MechanismError("it joins no two bodies of the mechanism")
+                if turned := _turn_of_bushing(strut):
+                    self.tree.notes.append(
+                        f"{strut.element} is left out of the forces: its frames are turned against"
+                        f" each other by {turned:.3g} rad in the start, and there is no preload of"
+                        " its torques"
+                    )
+                    raise MechanismError("it has a preload of torques")
                 yield _force_element(strut, names.new(strut.name))
             except MechanismError:
                 self.tree.count(strut.described)
@@ -384,27 +425,25 @@ class _Parts:
 
 
 def _force_element(strut: Strut, name: str) -> ForceElement:
-    """Return the force element between two links.
-
-    Raises:
-        CaseError: the frames of a bushing that resists turns are not parallel.
-    """
+    """Return the force element between two links."""
     law, (first, second) = strut.spring, strut.places
     p, q = coordinates(first.at), coordinates(second.at)
     if isinstance(law, Spring):
         stiffness = law.stiffness, law.damping
         return SpringDamper(name, *strut.links, (p, q), *stiffness, free_length=law.rest)
     apart = second.relative_to(first)
-    turned = float(np.linalg.norm([*rotation_vector(apart.turn)]))
-    if turned > PARALLEL and any((*law.turning_stiffness, *law.turning_damping)):
-        raise strut.element.fault(
-            f"its frames are turned against each other by {turned:.3g} rad in the start, expected"
-            " parallel ones; there is no preload of its torques: turn one of them, or leave it out"
-            f" by --without {strut.element.tag}"
-        )
     x, y = (coordinates(first.direction(axis)) for axis in (X, Y))
     preload = coordinates(vec([k * r for k, r in zip(law.stiffness, apart.at, strict=True)]))
     return Bushing(name, *strut.links, q, (x, y), **vars(law), preload=preload)
+
+
+def _turn_of_bushing(strut: Strut) -> float:
+    """Return the angle between the frames of a bushing with a torque [rad]; zero of others."""
+    law, (first, second) = strut.spring, strut.places
+    if isinstance(law, Spring) or not any((*law.turning_stiffness, *law.turning_damping)):
+        return 0.0
+    turned = float(np.linalg.norm([*rotation_vector(second.relative_to(first).turn)]))
+    return turned if turned > PARALLEL else 0.0
 
 
 def _locked_moves(tree: Tree) -> set[str]:

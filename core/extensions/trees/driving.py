@@ -371,13 +371,20 @@ def choose_held(
 
 
 def _candidates(tree: Tree, driving: Driving) -> list[Move]:
-    """Return the moves to hold, the first ones first."""
-    named = {*driving.moves, *driving.fixed}
+    """Return the moves to hold, the first ones first.
 
-    def order(move: Move) -> int:
+    Joints without a motor come in the order of the file. If files beside a robot or names of its
+    frames close it, those nearer to the base come first: most such robots have their motors there.
+    """
+    named = {*driving.moves, *driving.fixed}
+    depths: dict[str, int] = {}
+    for move in tree.moves.values():  # outer ones first
+        depths[move.inner] = 0 if tree.closes else 1 + depths.get(move.outer, 0)
+
+    def order(move: Move) -> tuple[int, int]:
         if move.is_axial:
-            return 1 if move.name in tree.actuated else 2
-        return 0 if move.kind == "free" else 3
+            return (1, 0) if move.name in tree.actuated else (2, depths[move.inner])
+        return (0, 0) if move.kind == "free" else (3, 0)
 
     loose = [move for move in tree.moves.values() if not {move.name, move.inner} & named]
     return sorted(loose, key=order)

@@ -131,6 +131,8 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
     """
     found: dict[tuple[str, str], list[tuple[Element, Vec3, Vec3]]] = {}
     for element, link_of, frame_of in elements:
+        if element.tag in (BALL, STRUT, BUSHING):
+            element.take("name")  # several ties of a frame have one name
         if element.tag == BALL:
             links, points = _ends(element, link_of)
             found.setdefault(links, []).append((element, *points))
@@ -138,7 +140,7 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
             try:
                 graph.struts.append(_strut(graph, element, link_of))
             except CaseError:
-                graph.tree.count(STRUT)
+                graph.tree.leave(element, STRUT)
         elif element.tag == BUSHING:
             graph.struts.append(_bushing_strut(element, frame_of))
             graph.tree.notes.append(f"{element}: {HALFWAY}")

@@ -45,6 +45,7 @@ SETTINGS = {
     "bounds": '<compiler boundmass="3" boundinertia="4"/>',
     "no geoms": '<compiler inertiafromgeom="false" boundinertia="0.1"/>',
     "all groups": '<compiler inertiagrouprange="0 5"/>',
+    "<inertial> where no group": '<compiler inertiafromgeom="true" inertiagrouprange="1 2"/>',
 }
 
 

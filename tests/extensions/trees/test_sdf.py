@@ -37,7 +37,7 @@ def test_link_under_two_joints_closes_loop(tmp_path):
     there = found.points["B"].position
     assert near(there, np.transpose(expected))
     assert {joint.name for joint in case.mechanism.joints} >= {"A", "B3", "C", "D"}
-    assert case.source.split(LEFT_OUT)[1] == "visual (1)"
+    assert case.source.split(LEFT_OUT)[1] == "visual (1), said of sdf (1)"
 
 
 def test_loop_joint_is_driven(tmp_path):
