@@ -192,14 +192,15 @@ def _bushing_strut(element: Element, frame_of: FrameOf) -> Strut:
     for part in laws:
         if element.child(part) is None:
             raise element.fault(f"<{part}>: missing, expected three numbers; add it")
-    values = [coordinates(element.child_vector(part)) for part in laws]
+    forces, torques, damping, turning = values = [
+        coordinates(element.child_vector(part)) for part in laws
+    ]
     if min(map(min, values)) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
     element.require_two(first, second)
     links = first, second
-    return Strut(
-        _name(element, links), links, (place, other), BushingLaw(*values), element, BUSHING
-    )
+    law = BushingLaw(forces, torques, damping, turning)
+    return Strut(_name(element, links), links, (place, other), law, element, BUSHING)
 
 
 def _named_child(element: Element, part: str) -> tuple[Element, str]:
