@@ -44,6 +44,7 @@ class Extension:
         engines: class of each engine in projection mode.
         simulations: function without arguments that returns each engine in simulate mode.
         writers: function that writes a mechanism in each format; see `case.io.model_writer`.
+        codes: function that returns the files of a solved case in a language, by their names.
         formats: who reads each format, for the help.
         converters: function from a model's file to the text that a simulator saves.
         views: HTML of a result or a mechanism in a notebook.
@@ -60,6 +61,7 @@ class Extension:
     engines: _Table = field(default_factory=dict[str, str])
     simulations: _Table = field(default_factory=dict[str, str])
     writers: _Table = field(default_factory=dict[str, str])
+    codes: _Table = field(default_factory=dict[str, str])
     formats: _Table = field(default_factory=dict[str, str])
     converters: _Table = field(default_factory=dict[str, str])
     views: _Table = field(default_factory=dict[str, str])
