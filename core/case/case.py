@@ -82,8 +82,8 @@ class Hardpoint:
             by x, y and z of the table [rad/m], shape (2 or 3, 3), if the joint is moved and the
             links keep their lengths; None for no such joint.
         no_bump_steer: how far the row moves along x, y or z of the table alone to leave no bump
-            steer at design, to first order [m], shape (3,); None for rows that are not an end of a
-            tie rod.
+            steer at design [m], shape (3,), infinite where that has no effect; None for rows that
+            are not an end of a tie rod.
     """
 
     name: str

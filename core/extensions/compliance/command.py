@@ -40,10 +40,10 @@ class FromDesign(Supplied):
     """Options of the readers; the travel counts from design, of any file."""
 
     travel: str | None = option(
-        "travel of the wheel from design, or of the steering with --axle steer: N samples, default"
-        " 25, from A to B: --travel=-60mm:60mm:25, which is the default; one number is one sample;"
-        " in metres without a unit",
-        metavar="A:B[:N]",
+        "travel of the wheel from design, or of the steering with --axle steer: up and down,"
+        " default 60mm:25, as in kincheck run; or START:STOP:SAMPLES, positive up:"
+        " --travel=-40:60mm:21; in metres without a unit",
+        metavar="LENGTH[:N]|A:B:N",
         heading=HARDPOINTS,
     )
 
@@ -108,7 +108,7 @@ class MeasureCompliance(Isolated):
         engines = self._engines(registry, problems)
         refuse(problems or shared_options.unreachable(self))
         typed, axle = self.supplied.travel, self.supplied.axle
-        travel = None if typed is None else _values("--travel", typed, LENGTHS)
+        travel = None if typed is None else _values("--travel", _both_ways(typed), LENGTHS)
         table = os.path.isfile(self.case) and is_table(Path(self.case))
         # the sweep of a table's case; one sample is none
         swept = table and travel is not None and travel[0] != travel[-1]
@@ -213,19 +213,35 @@ def _load(text: str) -> tuple[str, Any]:
     return name, found if ":" in values else found[0]
 
 
+def _both_ways(travel: str) -> str:
+    """Return LENGTH or LENGTH:SAMPLES, up and down as in kincheck run, as START:STOP:SAMPLES."""
+    length, *count = travel.split(":")
+    if not count and length.startswith("-"):
+        raise KincheckError(
+            f"--travel {travel}: expected a length such as 60mm, up and down, or"
+            f" START:STOP:SAMPLES; one sample is {travel}:{travel}:1"
+        )
+    if len(count) > 1 or length.startswith("-") or not all(map(str.isdecimal, count)):
+        return travel
+    if count and int(count[0]) < 2:
+        raise KincheckError(
+            f"--travel {travel}: found {count[0]} sample up and down, expected 2 or more, or"
+            " START:STOP:SAMPLES"
+        )
+    return ":".join([f"-{length}", length, *count])
+
+
 def _values(option: str, text: str, units: Mapping[str, Unit]) -> list[float]:
     """Return the samples A:B:N, or one number, in SI."""
     from ...case.io.document import interval
 
     parts = text.split(":")
     bare, other = [*units][:2]
-    count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else UNLESS_GIVEN
-    if len(parts) == 2 and option == "--travel" and parts[1].isdecimal() and text[0] != "-":
-        count = ""  # as run has it, up and down
     try:
         ends, _ = interval(parts[:2], units, bare)
     except ValueError:
         ends = [math.nan]
+    count = parts[2] if len(parts) == 3 else "1" if ends[0] == ends[-1] else UNLESS_GIVEN
     if not all(map(math.isfinite, ends)) or not count.isdecimal() or not 1 <= int(count) <= MOST:
         raise KincheckError(
             f"{option} {text}: expected START:STOP:SAMPLES or START:STOP, numbers in"
@@ -233,7 +249,7 @@ def _values(option: str, text: str, units: Mapping[str, Unit]) -> list[float]:
             f" -60{other}:60{other}:25"
         )
     start, stop, steps = ends[0], ends[-1], max(1, int(count) - 1)
-    return [start + (stop - start) * (k / steps) for k in range(int(count))]
+    return [0.0 + start + (stop - start) * (k / steps) for k in range(int(count))]
 
 
 def compliance(

@@ -52,6 +52,7 @@ class Wheel:
         point: its centre's name.
         spin: axis of rotation, outboard [-].
         travel: held driver of the height of its centre.
+        lift: sense of the driver, 1 up and -1 down.
         axes: x, y, z of the convention, shape (3, 3).
     """
 
@@ -62,6 +63,7 @@ class Wheel:
     contact: Vector
     spin: Vector
     travel: str
+    lift: float
     axes: Array
     vehicle: Vehicle | None
 
@@ -171,9 +173,9 @@ def _wheel(
     if vehicle is not None and vehicle.convention is not Convention.ISO_8855:
         axes[1:] *= -1.0
     at = next((d for d in travels if d.point == center.name), travels[0])
-    return Wheel(
-        *(name, center.body, center.name, center.position, contact, spin, at.name, axes, vehicle)
-    )
+    lift = float(np.sign(up @ np.array(at.direction)))
+    places = center.body, center.name, center.position, contact, spin
+    return Wheel(name, *places, at.name, lift, axes, vehicle)
 
 
 def _contact(

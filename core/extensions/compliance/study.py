@@ -12,7 +12,7 @@ Sources: the numbering and the factors are those of Adams/Car, Output of Suspens
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...case.case import TIME, Balance, Case, Load, Rig, Sweep, Truth
-from ...case.measures import DriverEffort
+from ...case.case import HELD_BUT, TIME, Balance, Case, Load, Rig, Sweep, Truth
+from ...case.measures import DriverEffort, ForceMeasure
 from ...case.quantity import (
     ORDERS,
     Output,
@@ -31,7 +31,7 @@ from ...case.quantity import (
     still_jets,
     with_markers,
 )
-from ...errors import KincheckError, SolveError, number_of, shortened
+from ...errors import KincheckError, SolveError, number_of
 from ...harness.record import Results
 from ...jet import Jet
 from ...kinematics import Equilibria, StaticModel, solve
@@ -39,6 +39,7 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Motion, Ramp
 from ...trajectory import Array, PointMotion
 from ..hardpoints.suspension import PerTravel
+from .rates import SIDES, Curve, wheel_rates
 from .rig import CONTACT, PER, Wheel, held_drivers, wheels_of
 
 # Engines agree on equilibria to round-off of their positions, which stiffness turns into forces.
@@ -47,7 +48,13 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 GOAL = "engines differ by round-off"
 DEFAULT_TRAVEL = np.linspace(-0.06, 0.06, 25)
 MOST_SAID = 5
-"""Failures and outputs that messages name."""
+"""Failures that messages name."""
+WHEEL_LOAD = "wheel_load"
+"""Name of the first curve, which a driver's effort in a case may have as well."""
+NOT_COMPUTED = "not computed: "
+"""Before the outputs without a curve, in notes."""
+SHARED = "redundant rows share its load; kincheck run --static tells what is determined"
+NO_VALUE = "it has no value at any of these samples, by its definition"
 
 
 class AxleMotion(StrEnum):
@@ -58,15 +65,6 @@ class AxleMotion(StrEnum):
     HEAVE = "heave"
     ROLL = "roll"
     STEER = "steer"
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """A quantity over the samples [SI], shape (n,); NaN without an equilibrium."""
-
-    values: Array
-    unit: str
-    sense: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +79,7 @@ class ComplianceCurves:
         compliance: C, shape (n, 6, 6) or (n, 12, 12).
         outputs: outputs and their slopes by name.
         rigid: outputs of the mechanism with joints in place of bushings, over travel.
+        not_computed: reasons by output of the case that has no curve.
         failures: samples without equilibrium, and the last ones with it.
         notes: facts for readers.
         turning: whether the travel is an angle.
@@ -94,6 +93,7 @@ class ComplianceCurves:
     compliance: Array
     outputs: Mapping[str, Curve]
     rigid: Mapping[str, Array]
+    not_computed: Mapping[str, str]
     failures: tuple[str, ...]
     notes: tuple[str, ...]
     turning: bool = False
@@ -174,7 +174,6 @@ def _load_text(load: Load, value: float) -> str:
 class _Study:
     def __init__(self, case: Case, axle: AxleMotion) -> None:
         self.case, self.axle, self.rig = case, axle, case.rig or Rig()
-        self.lacking = [x for x in case.outputs if not x.forces and x.orders < ORDERS - 1]
         soft = case.mechanism.released()
         held = held_drivers(case, self.rig, soft)
         self.wheels = wheels_of(case, held, soft)
@@ -187,8 +186,12 @@ class _Study:
         self.mechanism: Mechanism = replace(
             soft, drivers=[driver for driver in soft.drivers if driver.name in held]
         )
+        self.lacking = lacking(case, self.mechanism)
+        self.computed = [x for x in case.outputs if x.name not in self.lacking]
         self.model = StaticModel(
-            self.mechanism, [point for wheel in self.wheels for point in wheel.points]
+            self.mechanism,
+            [point for wheel in self.wheels for point in wheel.points],
+            {name for output in self.computed for name in output.forces},
         )
 
     @property
@@ -206,7 +209,7 @@ class _Study:
         if self.steering:
             return {self.steering: values}
         signs = (1.0, self._other)
-        return {w.travel: s * values for w, s in zip(self.wheels, signs, strict=False)}
+        return {w.travel: s * w.lift * values for w, s in zip(self.wheels, signs, strict=False)}
 
     def over_travel(self, values: Array, loads: Mapping[Load, Array]) -> ComplianceCurves:
         """Return the curves over travel, with constant loads."""
@@ -250,9 +253,8 @@ class _Study:
         known = [x for x in self.case.outputs if not x.forces and x.orders == ORDERS]
         sweep = Sweep(TIME, np.arange(n, dtype=np.float64), 0.0)
         if axis == "travel":
-            (first, _), *others = self._travels(np.ones(n)).items()
-            motions = {name: Ramp(float(x[0])) for name, x in others}
-            sweep = Sweep(first, at, 0.0, motions=motions)
+            (first, values), *others = self._travels(at).items()
+            sweep = Sweep(first, values, 0.0, motions=self._along(others))
         return replace(
             self.case,
             name=f"{self.case.name} over {axis}",
@@ -263,6 +265,14 @@ class _Study:
             reference={},
             balance=Balance(places, given),
         )
+
+    def _along(self, others: Iterable[tuple[str, Array]]) -> dict[str, Motion]:
+        """Return the motions of the other wheel's driver as the first wheel's moves at rate one."""
+        lift = self.wheels[0].lift
+        return {
+            name: Ramp(lift * wheel.lift * self._other)
+            for wheel, (name, _) in zip(self.wheels[1:], others, strict=False)
+        }
 
     def over_load(self, load: Load, values: Array) -> ComplianceCurves:
         """Return the curves over a load at design."""
@@ -281,7 +291,28 @@ class _Study:
         self, axis: str, at: Array, found: Equilibria, what: Callable[[float, float], str]
     ) -> ComplianceCurves:
         wheel, lost = self.wheels[0], ~found.reached
-        outputs = self._outputs(found) | self._rates(found)
+        outputs, own = self._outputs(found), self._rates(found)
+        taken = {*own, WHEEL_LOAD}
+        if any(x.name == WHEEL_LOAD and isinstance(x, DriverEffort) for x in self.computed):
+            taken.remove(WHEEL_LOAD)
+        if twice := sorted(outputs.keys() & taken):
+            raise KincheckError(
+                f"{self.case.name}: output {twice[0]!r} has the name of a result of kincheck kc;"
+                " give it another name"
+            )
+        outputs |= own
+        # a force or a quotient may have no value at all
+        none = {
+            name: NO_VALUE
+            for name, each in outputs.items()
+            if found.reached.any() and not np.isfinite(each.values[found.reached]).any()
+        }
+        shared = {
+            x.name: SHARED
+            for x in self.computed
+            if isinstance(x, ForceMeasure) and x.undetermined(found.forces)
+        }
+        not_computed = {**self.lacking, **none, **shared}
 
         def blank(values: Array) -> Array:
             return _blank_rows(values, lost)
@@ -298,12 +329,9 @@ class _Study:
             if way and ok
         ]
         notes = [f"{unstable[0]}; {len(unstable)} samples in all"] if unstable else []
-        if self.lacking:
-            listed = shortened([output.name for output in self.lacking], MOST_SAID)
-            notes.append(
-                f"not computed: {listed}: slopes of slopes, or with the other wheel held; kincheck"
-                " run has them for rigid joints"
-            )
+        for reason in dict.fromkeys(not_computed.values()):
+            names = [name for name, why in not_computed.items() if why == reason]
+            notes.append(f"{NOT_COMPUTED}{', '.join(names)}: {reason}")
         if not self.mechanism.forces:
             notes.append(
                 "nothing is elastic: there is no bushing and no spring, so nothing gives way to a"
@@ -319,10 +347,11 @@ class _Study:
             at,
             blank(found.place(wheel.body, wheel.center)),
             blank(found.direction(wheel.body, wheel.spin)),
-            blank(found.efforts[wheel.travel]),
+            blank(wheel.lift * found.efforts[wheel.travel]),
             blank(self._matrix(found)),
             {name: replace(x, values=blank(x.values)) for name, x in outputs.items()},
             {},
+            not_computed,
             tuple(failures),
             tuple(notes),
         )
@@ -356,17 +385,21 @@ class _Study:
     def _outputs(self, found: Equilibria) -> dict[str, Curve]:
         by_travel = sum(
             (
-                sign * found.by_driver[wheel.travel][0]
+                sign * wheel.lift * found.by_driver[wheel.travel][0]
                 for wheel, sign in zip(self.wheels, (1.0, self._other), strict=False)
             ),
             np.zeros(()),
         )
         by_load = {load: self._step(found, load) for load in self.rig.loads}
         curves = dict[str, Curve]()
-        for output in self.case.outputs:
-            if output.forces or output in self.lacking:
+        for output in self.computed:
+            if isinstance(output, ForceMeasure):
+                values = self._force(output, found)
+                curves[output.name] = Curve(values, output.unit, output.sense)
                 continue
-            value = self._value(output, found, np.asarray(by_travel))
+            alone = [found.by_driver[name][0] for name in output.facts.get(HELD_BUT, ())]
+            step = sum(alone, np.zeros(())) if alone else by_travel
+            value = self._value(output, found, np.asarray(step))
             curves[output.name] = Curve(value.x, output.unit, output.sense)
             if isinstance(output, PerTravel) or output.orders < ORDERS:
                 continue
@@ -377,6 +410,18 @@ class _Study:
                 sense = f"{output.sense}, per unit of {load} load".removeprefix(", ")
                 curves[f"{output.name}{PER[load]}"] = Curve(slope, unit, sense)
         return curves
+
+    def _force(self, output: ForceMeasure, found: Equilibria) -> Array:
+        if output.follows_points:
+            places = {
+                name: found.place(point.body, point.position)
+                for name in output.points
+                for point in (self.mechanism.point(name),)
+            }
+            output = output.with_points(
+                {name: point_jets(PointMotion(x, None, None)) for name, x in places.items()}
+            )
+        return output.values(found.forces)
 
     def _value(self, output: Quantity, found: Equilibria, step: Array) -> Jet:
         """Return an output, with its slope by a motion of the unknowns in place of its rate."""
@@ -392,60 +437,44 @@ class _Study:
         """Return an output of n samples by places of points and their rates, shape (n, 3)."""
         moving = {name: point_jets(PointMotion(*at(name), None)) for name in output.points}
         design = {name: still_jets(self.mechanism.point(name).position) for name in output.points}
-        jet = known_at(output, moving, design)
+        with np.errstate(all="ignore"):  # NaN marks unknown values
+            jet = known_at(output, moving, design)
         x, v, a = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (jet.x, jet.v, jet.a))
         return Jet(x, v, a)
 
     def _rates(self, found: Equilibria) -> dict[str, Curve]:
-        """Return wheel rates, and roll stiffness; see the documentation for definitions."""
-        first = self.wheels[0]
-        order = list(self.model.drivers)
-        own = found.by_driver[first.travel][1][:, order.index(first.travel)]
-        rates = {
-            "wheel_rate": Curve(own, "N/m", "upward force per upward travel of the wheel's centre")
-        }
-        y = abs(float(np.array(first.axes[1]) @ (np.array(first.center) - self._middle(first))))
-        opposite = own
-        if len(self.wheels) == 2:
-            across = found.by_driver[self.wheels[1].travel][1][:, order.index(first.travel)]
-            opposite = own - across
-            rates["wheel_rate"] = replace(rates["wheel_rate"], values=own + across)
-            rates["wheel_rate_opposite"] = Curve(opposite, "N/m", "both wheels against each other")
-            rates["anti_roll_share"] = Curve(
-                -2.0 * across / opposite, "1", "part of the roll stiffness that couples both wheels"
+        """Return wheel rates, roll stiffness and, of an axle, both wheels' loads."""
+        wheels, order = self.wheels, list(self.model.drivers)
+        lifts = np.array([wheel.lift for wheel in wheels])
+        own = [order.index(wheel.travel) for wheel in wheels]
+        by = [found.by_driver[wheel.travel][1][:, own] for wheel in wheels]
+        matrix = lifts[:, None] * np.stack(by, axis=-1) * lifts
+        across = wheels[0].axes[1]
+        if len(wheels) == 2:
+            track = abs(float(across @ np.subtract(wheels[0].center, wheels[1].center)))
+        else:
+            middle = (0.0, 0.0, 0.0) if wheels[0].vehicle is None else wheels[0].vehicle.middle
+            track = 2.0 * abs(float(across @ np.subtract(wheels[0].center, middle)))
+        rates = wheel_rates(matrix, track, self._other, self.rig.tire_stiffness)
+        for side, wheel in zip(SIDES, wheels, strict=False) if len(wheels) == 2 else ():
+            load = wheel.lift * found.efforts[wheel.travel]
+            rates[f"wheel_load_{side}"] = Curve(
+                load, "N", "upward force to hold its centre's height"
             )
-        if y:
-            rates["roll_stiffness"] = Curve(
-                2.0 * y * y * opposite, "N m/rad", "torque per roll angle of both wheels' centres"
-            )
-        if (tire := self.rig.tire_stiffness) is not None:
-
-            def series(k: Array) -> Array:
-                return k * tire / (k + tire)
-
-            rates["ride_rate"] = Curve(
-                series(rates["wheel_rate"].values), "N/m", "wheel rate in series with the tire's"
-            )
-            if y:
-                rates["roll_rate"] = Curve(
-                    2.0 * y * y * series(opposite), "N m/rad", "roll stiffness with the tires'"
-                )
         return rates
-
-    def _middle(self, wheel: Wheel) -> Array:
-        return np.array((0.0, 0.0, 0.0) if wheel.vehicle is None else wheel.vehicle.middle)
 
     def _rigid(self, values: Array) -> dict[str, Array]:
         """Return the outputs of the mechanism with its joints; none if it cannot move so."""
         mechanism = self.case.mechanism
         travels = self._travels(values)
-        driver, given = next(iter(travels.items()))
-        others: dict[str, Motion] = {}
-        if len(travels) == 2:
-            others = {[*travels][1]: Ramp(self._other)}
+        (driver, given), *others = travels.items()
         try:
             moved = solve(
-                mechanism, driver, given + mechanism.design_value(driver), order=1, motions=others
+                mechanism,
+                driver,
+                given + mechanism.design_value(driver),
+                order=1,
+                motions=self._along(others),
             )
         except SolveError:  # it has other freedoms, and no rigid curve to compare with
             return {}
@@ -457,9 +486,39 @@ class _Study:
 
         return {
             output.name: np.where(moved.solved, self._output(output, at, len(values)).x, np.nan)
-            for output in self.case.outputs
-            if not output.forces and output not in self.lacking
+            for output in self.computed
+            if not output.forces and self._along_sweep(output, travels)
         }
+
+    def _along_sweep(self, output: Quantity, travels: Mapping[str, Array]) -> bool:
+        """Return whether the rates along the sweep are those of an output's own drivers."""
+        alone = {*output.facts.get(HELD_BUT, ())}
+        return not alone or (alone == {*travels} and self._other > 0.0)
+
+
+def lacking(case: Case, soft: Mechanism) -> dict[str, str]:
+    """Return why equilibria do not have an output, by its name; `soft` holds the held drivers."""
+    found = dict[str, str]()
+    held = {driver.name for driver in soft.drivers}
+    drivers = {driver.name for driver in case.mechanism.drivers}
+    known = {each.name for each in (*soft.given_joints, *soft.forces)} | held
+    for output in case.outputs:
+        read = {*output.forces} - known
+        if isinstance(output, PerTravel) and output.of_output.orders < ORDERS:
+            found[output.name] = "a slope of a slope; kincheck run has it for rigid joints"
+        elif isinstance(output, DriverEffort) and output.at is not None:
+            found[output.name] = (
+                "an effort at another joint follows the motion of rigid joints; kincheck run has it"
+            )
+        elif {*output.facts.get(HELD_BUT, ())} - held or read & drivers:
+            found[output.name] = "its driver is free here; name it in [compliance] held"
+        elif read:
+            (name, *_) = read
+            found[output.name] = (
+                f"joint {name!r} gives way to its bushings; give them as [forces.NAME], and ask for"
+                " their element_force"
+            )
+    return found
 
 
 def _stiffnesses(each: Any) -> Sequence[float]:

@@ -20,7 +20,8 @@ from ...report.sections import Diagram, Report, Section
 from ...report.sections import page as render
 from ...trajectory import Array
 from ...unit_text import with_unit
-from .study import MOST_SAID, ComplianceCurves, ComplianceResults, Curve
+from .rates import Curve
+from .study import MOST_SAID, NOT_COMPUTED, WHEEL_LOAD, ComplianceCurves, ComplianceResults
 
 SCHEMA = "kincheck-compliance/1"
 DEGREE = 180.0 / math.pi
@@ -94,6 +95,7 @@ def _data(curves: ComplianceCurves) -> dict[str, Any]:
             for name, each in curves.outputs.items()
         },
         "rigid": {name: _rows_or_none(values) for name, values in curves.rigid.items()},
+        "not_computed": {**curves.not_computed},
         "notes": [*curves.notes],
     }
 
@@ -117,12 +119,13 @@ def table(results: ComplianceResults) -> str:
     writer = csv.writer(text, lineterminator="\n")
     first = results.travel
     center = [f"wheel_center_{axis} [mm]" for axis in "xyz"]
-    names = {name: _shown(each.unit) for name, each in first.outputs.items()}
+    names = {name: _shown(each.unit) for name, each in first.outputs.items() if name != WHEEL_LOAD}
     heads = [with_unit(name, unit) for name, (unit, _) in names.items()]
     heads += [with_unit(f"{name}.rigid", names[name][0]) for name in first.rigid]
-    if results.signs:
-        text.write(f"# {results.signs}\n")
-    writer.writerow(["over", "value", "unit", *center, "wheel_load [N]", *heads])
+    missing = [note for note in first.notes if note.startswith(NOT_COMPUTED)]
+    if said := "; ".join(filter(None, (results.signs, *missing))):
+        text.write(f"# {said}\n")
+    writer.writerow(["over", "value", "unit", *center, f"{WHEEL_LOAD} [N]", *heads])
     for curves in (first, *results.loads.values()):
         unit, factor = unit_of_axis(curves)
         columns: list[Sequence[float] | Array] = [
@@ -162,7 +165,9 @@ def lines(results: ComplianceResults) -> Iterator[str]:
     if not math.isfinite(curves.wheel_load[k]):
         yield f"no equilibrium at any of {len(curves.at)} samples of travel"
         return
-    yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {curves.wheel_load[k]:.6g} N"
+    load = float(curves.wheel_load[k])
+    load = 0.0 if abs(load) < ZERO else load
+    yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {load:.6g} N"
     for name, each in curves.outputs.items():
         shown, size = _shown(each.unit)
         if not np.isfinite(each.values).any():
@@ -207,7 +212,7 @@ def _section(number: int, curves: ComplianceCurves) -> Section:
     styles = [soft, rigid] if curves.rigid else [soft]
     unit, factor = unit_of_axis(curves)
     x, diagrams = _drawn(factor * curves.at), list[Diagram]()
-    for name, each in {"wheel_load": Curve(curves.wheel_load, "N"), **curves.outputs}.items():
+    for name, each in {WHEEL_LOAD: Curve(curves.wheel_load, "N"), **curves.outputs}.items():
         shown, size = _shown(each.unit)
         data = [soft.curve(x, _drawn(size * each.values))]
         if name in curves.rigid:

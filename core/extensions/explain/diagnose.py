@@ -17,6 +17,7 @@ from ...harness.native_engine import explain
 from ...kinematics import forces_of
 from ...trajectory import Array, Trajectory
 from ..sweep.varied_places import Geometry
+from .bump_steer import bump_steer, left_by_moves
 from .conditioning import Conditioning, conditioning
 from .outputs import Budget, Sensitivity, binding_numbers, budgets, read_points, sensitivities
 from .rank import (
@@ -166,8 +167,11 @@ class Diagnosis(msgspec.Struct, frozen=True):
         shims: derivatives of toe, camber and caster at design by x, y and z of each joint of a
             table that is moved while the links keep their lengths and the wheel its height [rad/m],
             by row.
+        bump_steer: slope of toe by travel at design [rad/m]; null without.
         no_bump_steer: how far each end of a tie rod moves along x, y or z of the table alone to
-            leave no bump steer at design, to first order [m], by row; null where it has no effect.
+            leave no bump steer at design [m], by row; null where it has no effect.
+        bump_steer_left: the bump steer of the table with this move, solved again [rad/m]; null for
+            a move beyond 50 mm, which is out of reach, or if it cannot be solved.
         moves: places of the case that follow each hardpoint, direction or length, by its name.
         signs: sign conventions of the outputs; empty without.
         not_derived: outputs of more than the pose, without budget.
@@ -196,7 +200,9 @@ class Diagnosis(msgspec.Struct, frozen=True):
     sensitivities: list[Sensitivity]
     binding: list[str]
     shims: dict[str, list[list[float]]]
+    bump_steer: float | None
     no_bump_steer: dict[str, list[float | None]]
+    bump_steer_left: dict[str, list[float | None]]
     moves: dict[str, list[str]]
     signs: str
     not_derived: list[str]
@@ -280,11 +286,13 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         sensitivities=sensitivities(case, swept, geometry) if swept and derived else [],
         binding=binding_numbers(swept, variables) if swept and derived else [],
         shims={each.name: each.shim.tolist() for each in case.hardpoints if each.shim is not None},
+        bump_steer=bump_steer(case) if derived else None,
         no_bump_steer={
             each.name: [float(x) if np.isfinite(x) else None for x in each.no_bump_steer]
             for each in case.hardpoints
             if each.no_bump_steer is not None
         },
+        bump_steer_left=left_by_moves(case) if derived else {},
         moves={each.name: each.places for each in variables},
         signs=case.signs,
         not_derived=[output.name for output in case.outputs if output.orders != ORDERS],

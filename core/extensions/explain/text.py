@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...report.terminal import columns, join_names
+from .bump_steer import REACH
 from .diagnose import Determinacy, Diagnosis, Sample
 from .rank import NamedRow, describe_screws
 
@@ -223,11 +224,26 @@ def _shims(found: Diagnosis) -> Iterator[Text | Table]:
         table.add_row(name, *(f"{0.0 + round(each, 4):+.4f}" for each in numbers), "deg")
     yield table
     if found.no_bump_steer:
-        yield _head("no bump steer at design, to first order, if one of these moves in the table")
+        now = "–" if found.bump_steer is None else f"{math.degrees(found.bump_steer):+.3g} deg/m"
+        yield _head(
+            f"no bump steer at design ({now} now), if one of these moves alone in the table, and"
+            " what is left with it, solved again"
+        )
         table = columns("along", ">x", ">y", ">z", "")
         for name, moves in found.no_bump_steer.items():
-            table.add_row(name, *("–" if x is None else f"{1e3 * x:+.1f}" for x in moves), "mm")
+            left = found.bump_steer_left.get(name, [None] * len(moves))
+            table.add_row(name, *map(_move, moves, left), "mm, deg/m")
         yield table
+
+
+def _move(move: float | None, left: float | None) -> str:
+    """Return a move and the bump steer left with it; or no move in reach."""
+    if move is None:
+        return "–"
+    shown = f"{1e3 * move:+.1f}"
+    if abs(move) > REACH:
+        return f"none in reach ({shown})"
+    return f"{shown} ({'not solved' if left is None else f'{math.degrees(left):.1g} left'})"
 
 
 def _sensitivities(found: Diagnosis, most: int) -> Iterator[Text | Table]:

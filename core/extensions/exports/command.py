@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -74,6 +75,7 @@ class Export(OfCase):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
+        from ...report.progress import complain
         from .model_writer import written
 
         if (code := offers("codes").get(self.to)) is not None:
@@ -82,11 +84,9 @@ class Export(OfCase):
             raise KincheckError(f"{found}: only code takes it. Leave it out, or add --to c.")
         writer = writer_of(self.to)
         case = registry.case_of(self, driven=False)
-        keep_texts(
-            written(case, writer, driver_value(self.at, case)),
-            case.name,
-            self.out,
-        )
+        texts = written(case, writer, driver_value(self.at, case))
+        keep_texts(texts, case.name, self.out)
+        complain(f"note: left out: {each}" for each in _left_out(texts))
         return Status.WITHIN
 
     def _write_code(self, code: Offer, registry: Registry) -> int:
@@ -110,6 +110,12 @@ class Export(OfCase):
         if left:
             complain([f"{case.name}: the code has no forces: {shortened(left, MOST_NAMED)}"])
         return Status.WITHIN
+
+
+def _left_out(texts: Mapping[str, str]) -> list[str]:
+    """Return what the comments of written files say that their format cannot hold."""
+    lines = " ".join(each.lstrip("# ") for text in texts.values() for each in text.splitlines())
+    return re.findall(r"Left out: (.+?)\.(?= |$)", lines)
 
 
 def keep_texts(

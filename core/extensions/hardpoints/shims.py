@@ -6,8 +6,11 @@ wheel carrier has six velocities, of the wheel's centre and of rotation. Its lin
 height, which is held:  n . (v + w x r) = n . u,  n being the direction that a joint holds, r its
 place from the wheel's centre, and u the velocity by the shim.
 
-A tie rod l from a to b holds  l . (v + w x r_b) = 0  while the wheel moves up. An end that moves
-in the table turns l, and with it the velocities at design, which the same six rows give.
+A tie rod l from a to b holds  l . (v + w x r_b) = 0  while the wheel moves up. Without it, and with
+a toe rate of zero in its place, the carrier has the velocities v*, w*, and b has  v_b* = v* + w* x
+r_b,  wherever the ends of the rod are. So there is no bump steer where  l . v_b* = 0.  An end that
+moves alone in the table along e by m changes this, a by  -m e . v_b*,  and b by  m e . (v_b* + l x
+w*),  exactly.
 """
 
 from __future__ import annotations
@@ -33,8 +36,8 @@ def shims(
 
     First the derivatives of toe, camber and, where two points make the steering axis, caster
     [rad/m] by x, y and z of each joint that a shim moves, shape (2 or 3, 3). Then, for each end of
-    the tie rod, by how much it leaves no bump steer at design, to first order, if it is moved alone
-    in the table along x, y or z [m], shape (3,); infinite where that has no effect.
+    the tie rod, by how much it leaves no bump steer at design if it is moved alone in the table
+    along x, y or z [m], shape (3,); infinite where that has no effect.
 
     Args:
         at: positions by role of a left wheel [m].
@@ -70,14 +73,17 @@ def shims(
         return found, {}
     outer = held[rods[0]][0]
     along = places[outer] - places[TIEROD_INNER]
-    moving = np.linalg.solve(rows, np.eye(6)[:, [5, rods[0]]])
-    dx, dy, _ = np.cross(moving[3:].T, spin).T
-    by_travel, by_rod = (y * dx - x * dy) / (x**2 + y**2)
-    w = moving[3:, 0]
-    end = moving[:3, 0] + np.cross(w, places[outer] - places[WHEEL_CENTER])
-    wanted = -by_travel * np.linalg.norm(along) / by_rod
-    with np.errstate(divide="ignore"):
-        return found, {TIEROD_INNER: wanted / end, outer: -wanted / (end + np.cross(along, w))}
+    # the wheel's rate of toe in place of the tie rod, and a rate of one of the height, the last row
+    rows[rods[0]] = np.r_[0.0, 0.0, 0.0, x * spin[2], y * spin[2], -x * x - y * y]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        try:
+            solved = np.asarray(np.linalg.solve(rows, np.eye(6)[5]), float)
+        except np.linalg.LinAlgError:  # the tie rod does not steer
+            return found, {}
+        v, w = solved.reshape(2, 3)
+        end = v + np.cross(w, places[outer] - places[WHEEL_CENTER])
+        off = float(along @ end)
+        return found, {TIEROD_INNER: off / end, outer: -off / (end + np.cross(along, w))}
 
 
 def _end_velocity(

@@ -174,8 +174,8 @@ def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Fig
 def tornado_figure(view: OutputView) -> Figure:
     """Return a bar for each coordinate, the largest on top.
 
-    A bar is the output's change by the coordinate's standard deviation, half width or largest
-    offset.
+    A bar is the output's change by the coordinate's standard deviation, or by its largest offset
+    if one coordinate at a time varies.
     """
     bars = view.gradients[:MOST_BARS][::-1]
     lengths = [float(f"{view.scale * effect(each):.{DIGITS}g}") for each in bars]

@@ -23,6 +23,7 @@ from .conformance import Capability, Histogram
 from .cross_check import Checked
 from .statistics import QUANTILES, Quantiles, Summary
 from .study import Gradients, Study, Unsolved
+from .study_choices import Mode
 from .variation import Law
 
 Numbers = list[float | None]
@@ -98,7 +99,9 @@ class Gradient(msgspec.Struct, frozen=True, kw_only=True):
         error: bound of the error, from two step sizes.
         accurate: whether `error` is at most 1e-6 of the output's largest gradient by any coordinate
             of the same unit.
-        scale: scale of the coordinate; times `largest` it is the bar of a tornado diagram.
+        scale: scale of the coordinate.
+        deviation: standard deviation of the coordinate's offsets, or the largest offset if one
+            coordinate at a time varies [unit]; times `largest` it is the effect.
     """
 
     output: str
@@ -111,6 +114,7 @@ class Gradient(msgspec.Struct, frozen=True, kw_only=True):
     error: float | None
     accurate: bool
     scale: float
+    deviation: float
 
 
 class Effect(msgspec.Struct, frozen=True, kw_only=True):
@@ -276,6 +280,7 @@ def _by_probability(values: Array) -> dict[str, Numbers]:
 def gradient_table(study: Study, found: Gradients) -> list[Gradient]:
     """Return every gradient, by output and coordinate."""
     table: list[Gradient] = []
+    alone = study.variation.mode is Mode.ONE_AT_A_TIME
     for r, row in enumerate(study.rows):
         for c, coordinate in enumerate(study.variation.coordinates):
             along = found.along[c, r]
@@ -295,6 +300,7 @@ def gradient_table(study: Study, found: Gradients) -> list[Gradient]:
                     error=numbers(found.error[c, r : r + 1])[0],
                     accurate=bool(found.accurate[c, r]),
                     scale=coordinate.scale,
+                    deviation=coordinate.scale if alone else coordinate.standard_deviation,
                 )
             )
     return table

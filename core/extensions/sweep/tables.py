@@ -16,7 +16,7 @@ from ...report.table import print_signs
 from ...report.terminal import FittingTable
 from .conformance import Capability, sparkline
 from .results import Gradient, SweepResults
-from .study_choices import Incomplete
+from .study_choices import Incomplete, Mode
 
 
 def limit_notes(results: SweepResults) -> list[str]:
@@ -92,9 +92,10 @@ def print_sweep(results: SweepResults, file: TextIO) -> None:
 
 
 def _extremes(results: SweepResults) -> FittingTable:
+    by = "offset" if results.mode == Mode.ONE_AT_A_TIME else "st. dev."
     table = terminal.columns(
         *("output", "unit", ">least", ">variant", ">most", ">variant"),
-        *(">largest\nst. dev.", ">largest\n1-99 %", "largest effect\n(gradient x scale)"),
+        *(">largest\nst. dev.", ">largest\n1-99 %", f"largest effect\n(gradient x {by})"),
     )
     for name, each in results.outputs.items():
         unit, scale = results.shown_unit(each.unit)
@@ -243,10 +244,10 @@ def headline(results: SweepResults) -> str:
 
 
 def effect(gradient: Gradient) -> float:
-    """Return the size of a bar: the largest gradient times its coordinate's scale [unit of the
-    output].
+    """Return the size of a bar: the largest gradient times the standard deviation of its
+    coordinate, or the largest offset if one coordinate at a time varies [unit of the output].
     """
-    return abs(gradient.largest or 0.0) * gradient.scale
+    return abs(gradient.largest or 0.0) * gradient.deviation
 
 
 # CSV: a missing value is an empty field.
@@ -284,7 +285,7 @@ def gradient_csv(results: SweepResults) -> str:
     """Return a line for each output and coordinate."""
     numbers = ("at_design", "largest", "error")
     columns = ["output", "coordinate", "unit", "at_design", "largest", "sample", "error"]
-    columns += ["accurate", "scale", "scale_unit", "effect", "effect_unit"]
+    columns += ["accurate", "scale", "scale_unit", "standard_deviation", "effect", "effect_unit"]
     rows: list[Sequence[Any]] = []
     for each in results.gradients:
         unit, scale = results.shown_unit(results.outputs[each.output].unit)
@@ -294,7 +295,7 @@ def gradient_csv(results: SweepResults) -> str:
             [
                 *(each.output, each.coordinate, f"({unit})/({its})"),
                 *(at, largest, each.sample, error, each.accurate),
-                *(factor * each.scale, its, scale * effect(each), unit),
+                *(factor * each.scale, its, factor * each.deviation, scale * effect(each), unit),
             ]
         )
     return csv_text(columns, rows)

@@ -294,6 +294,10 @@ class Limit:
     high: float = math.inf
 
 
+NODES = 40
+"""Nodes that integrate a normal density over nine deviations to round-off."""
+
+
 @dataclass(frozen=True)
 class Coordinate:
     """One independently varied number: a coordinate of a hardpoint, a component of a direction, a
@@ -321,6 +325,25 @@ class Coordinate:
     def name(self) -> str:
         """The name in results."""
         return f"{self.hardpoint}.{self.axis}" if self.axis else self.hardpoint
+
+    @property
+    def standard_deviation(self) -> float:
+        """The standard deviation of its offsets, listed ones being equally frequent [unit]."""
+        match self.law:
+            case Law.NORMAL:
+                return self.scale
+            case Law.UNIFORM:
+                return self.scale / math.sqrt(3.0)
+            case Law.TRIANGULAR:
+                return self.scale / math.sqrt(6.0)
+            case Law.TRUNCATED_NORMAL:
+                # by quadrature: beyond nine deviations nothing is left to cut off
+                nodes, weights = np.polynomial.legendre.leggauss(NODES)
+                x = 0.5 * min(self.bound / self.scale, 9.0) * (1.0 + nodes)
+                weights = weights * np.exp(-0.5 * x * x)
+                return self.scale * math.sqrt(float(weights @ (x * x)) / float(weights.sum()))
+            case Law.VALUES:
+                return float(np.std(self.values))
 
 
 @dataclass(frozen=True, eq=False)

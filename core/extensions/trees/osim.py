@@ -24,11 +24,11 @@ from ...case.io.document import fault, read_text, shown
 from ...errors import KincheckError
 from ...extras import library
 from ...joints import PiecewisePolynomial, Spline
+from ...mechanism.loads import Law
 from .element import ZEROS, Element, parse_xml, words
 from .graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
 from .masses import mass_in
 from .place import ORIGIN, Place, turn_about, unit_quaternion
-from .robot_elements import HALFWAY
 from .tree import (
     NO_LIMIT,
     BushingLaw,
@@ -84,6 +84,7 @@ IN_CONSTRAINT = (
 _INSIDE = ("objects", "components", "frames", "coordinates", "Model")
 _TIED = (*words("BodySet JointSet ConstraintSet ForceSet MarkerSet CoordinateSet FrameSet"),)
 GRAVITY = (0.0, -9.80665, 0.0)
+BY_RATES = "its turning damping is by the angular velocity, and in OpenSim by rates of angles"
 """Gravity unless given [m/s^2]."""
 DEEPEST_FRAME = 50
 ON_LINE = 1e-12
@@ -448,7 +449,8 @@ class _Reader:
                 numbers = [
                     each.child_number(key, 0.0) for key in ("stiffness", "viscosity", "rest_length")
                 ]
-                tree.springs[coordinate] = Spring(*numbers)
+                own, others = Spring(*numbers), tree.springs.get(coordinate)
+                tree.springs[coordinate] = own if others is None else own.beside(others)
             elif each.tag == "BushingForce":
                 self._add_bushing(each)
             elif each.tag == "PointToPointSpring":
@@ -483,8 +485,10 @@ class _Reader:
             for kind in ("translational", "rotational")
         ]
         numbers = [(x, y, z) for x, y, z in laws]
-        self._add_strut(element, *self._ends(element, "socket_frame{}"), BushingLaw(*numbers))
-        self.graph.tree.notes.append(f"{element}: {HALFWAY}")
+        law = BushingLaw(*numbers, law=Law.CARDAN)
+        self._add_strut(element, *self._ends(element, "socket_frame{}"), law)
+        if any(law.turning_damping):
+            self.graph.tree.notes.append(f"{element}: {BY_RATES}")
 
     def _add_strut(
         self,

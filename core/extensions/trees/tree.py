@@ -21,6 +21,7 @@ from ...algebra import ZERO, Vec3, X, Y, Z
 from ...case.io.document import LARGEST, decimal, fault, shown
 from ...errors import CaseError, MechanismError
 from ...joints import PiecewisePolynomial, Spline
+from ...mechanism.loads import Law
 from ...mechanism.mechanism import GROUND, Vector
 from ...trajectory import Array
 from .element import Element, Names
@@ -57,17 +58,25 @@ class Spring:
     damping: float
     rest: float
 
+    def beside(self, other: Spring) -> Spring:
+        """Return the spring and damper that acts as this and another one together."""
+        stiffness = self.stiffness + other.stiffness
+        force = self.stiffness * self.rest + other.stiffness * other.rest
+        rest = force / stiffness if stiffness else 0.0
+        return Spring(stiffness, self.damping + other.damping, rest)
+
 
 @dataclass(frozen=True)
 class BushingLaw:
     """Stiffness and damping along and about the axes of a bushing's first frame, three each [N/m,
-    N m/rad, N s/m, N m s/rad].
+    N m/rad, N s/m, N m s/rad], and the law of its torque.
     """
 
     stiffness: Vector
     turning_stiffness: Vector
     damping: Vector
     turning_damping: Vector
+    law: Law = Law.EULER_PARAMETERS
 
 
 INFINITE = 1e15

@@ -15,7 +15,7 @@ equations. `rest` is the unbalance at design, taken away little by little.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
@@ -44,6 +44,7 @@ from ...trajectory import Array
 from ..compiled.request import Layout
 from ..compiled.traced_forces import angles
 from ..forces.equations import BodyStates, ForceEquations
+from ..forces.wanted import wanted_forces
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import frames
 from ..formulation.formulation import GROUND_ACCELERATION, Configuration
@@ -62,6 +63,8 @@ MULTIPLIERS = "multipliers"
 BY = "by "
 """Before the name of a load's component or a driver: derivatives of step and efforts by it."""
 EFFORTS = "efforts"
+FORCE = "force of "
+"""Before the name of a force element or joint: its amount, or its force and moment."""
 # A motion with less stiffness than this part of the largest has none: round-off is 1e-15, and
 # torsion of rubber beside a stiff bushing is 1e-6.
 FREE = 1e-11
@@ -92,12 +95,22 @@ class StaticEquations:
         chosen, dropped: independent rows, and redundant ones.
         rest: the unbalance at design [J], shape (unknowns,).
         multipliers: of the chosen rows at design, which carry the other forces [J].
+        wanted: force elements and joints whose forces the programs have.
+
+    Args:
+        forces: names of these.
 
     Raises:
-        SolveError: nothing holds a body in some direction.
+        SolveError: nothing holds a body in some direction, or no force has such a name.
     """
 
-    def __init__(self, mechanism: Mechanism, loads: Sequence[LoadPoint] = ()) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        loads: Sequence[LoadPoint] = (),
+        forces: Collection[str] = (),
+    ) -> None:
+        self.wanted = wanted_forces(mechanism, forces)
         for each in mechanism.forces:
             if isinstance(each, TorsionSpringDamper) and not isinstance(
                 mechanism.joint(each.joint), AxialJoint
@@ -159,13 +172,15 @@ class StaticEquations:
             x for each in self._drives.values() for x in (each.c, each.half_cos, each.half_sin)
         ]
         at = self._formulation.configuration(self._formulation.retract(self._now, step))
-        balance = self._balance(at, multipliers, pulls)
+        balance, forces = self._balance(at, multipliers, pulls)
         slopes = jacobian(self._tape, balance, [*step, *multipliers, *drives, *pulls], smooth=True)
         # at a step of zero; in one call, as values and slopes share most operations
         every = [*balance, *(x for row in slopes for x in row.values())]
+        every += [x for each in forces.values() for x in each]
         found = iter(folded(self._tape, every, dict.fromkeys(self.vectors[f"{STEP} of"], 0.0)))
         balance = [next(found) for _ in balance]
         rows = [{k: next(found) for k in row} for row in slopes]
+        forces = {name: [next(found) for _ in each] for name, each in forces.items()}
         slopes = [{k: x for k, x in row.items() if not is_literal_zero(x)} for row in rows]
         tangent = [{k: x for k, x in row.items() if k < self.order} for row in slopes[: self.order]]
         self.tangent = [(i, k) for i, row in enumerate(tangent) for k in row]
@@ -193,6 +208,7 @@ class StaticEquations:
             DETERMINANT: [factor.determinant(per_pivot)],
         }
         compliance = {EFFORTS: balance[self.order :], **self._compliance(factor, slopes, scale)}
+        compliance |= forces
         programs = (
             entries,
             self._program("newton", newton),
@@ -202,9 +218,9 @@ class StaticEquations:
 
     def _balance(
         self, at: Configuration, multipliers: Sequence[Scalar], pulls: Sequence[Scalar]
-    ) -> list[Scalar]:
+    ) -> tuple[list[Scalar], dict[str, list[Scalar]]]:
         """Return F - J^T lambda by the unknowns [J], the gaps of the chosen rows, and the efforts
-        of the drivers [N or N m].
+        of the drivers [N or N m]; and the wanted forces by slots.
         """
         bodies = self._formulation.bodies
         still = dict.fromkeys(bodies, Twist(ZERO, ZERO))
@@ -226,7 +242,11 @@ class StaticEquations:
                 demand[k] = demand[k] - x * multiplier
         gaps = self._formulation.phi(at)
         efforts = [equations.effort(each, every) for each in self.mechanism.drivers]
-        return [*demand, *(gaps[k] for k in self.chosen), *efforts]
+        forces = {f"{FORCE}{x}": [equations.applied[x].amount] for x in self.wanted.elements}
+        for name in self.wanted.joints:
+            force, moment = equations.reaction(self.mechanism.joint(name), every)
+            forces[f"{FORCE}{name}"] = [*((1.0 / self.frame.unit) * force), *moment]
+        return [*demand, *(gaps[k] for k in self.chosen), *efforts], forces
 
     def _at_design(self, entries: Program, forces: Sequence[Scalar]) -> tuple[float, float]:
         """Find what is out of balance at the design position without loads, and the multipliers

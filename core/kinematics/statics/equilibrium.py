@@ -16,7 +16,7 @@ Its ratios, unlike sizes of corrections, show this of one body among others that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ...algebra import quat, vec
 from ...errors import SolveError
+from ...forces import Forces, Reaction
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Pose
 from ...program.llvm.compiler import available
@@ -40,6 +41,7 @@ from .equations import (
     DETERMINANT,
     DRIVE,
     EFFORTS,
+    FORCE,
     LOAD,
     MULTIPLIERS,
     REST,
@@ -92,6 +94,8 @@ class Equilibria:
         least: smallest eigenvalue of the reduced stiffness over the largest, shape (n,).
         unstable: the motion away by itself, by sample; empty for a stable equilibrium.
         iterations: Newton iterations, shape (n,).
+        wanted: by force element or joint, the amount, shape (1, n), or force and moment on the
+            second body, shape (6, n) [N, N m].
     """
 
     model: StaticModel
@@ -104,6 +108,25 @@ class Equilibria:
     least: Array
     unstable: Sequence[str]
     iterations: NDArray[np.int64]
+    wanted: Mapping[str, Array]
+
+    @property
+    def forces(self) -> Forces:
+        """The wanted forces; of redundant rows some carry all, so then no reaction is unique."""
+        n, wanted = len(self.share), self.model.equations.wanted
+        whole = np.eye(6)[:, : 6 * bool(self.model.equations.dropped)]
+        free, unknown = np.broadcast_to(whole, (n, *whole.shape)), np.full(n, np.nan)
+
+        def reaction(values: Array) -> Reaction:
+            return Reaction(values[:3].T, values[3:].T, free, np.zeros(n))
+
+        return Forces(
+            {name: reaction(self.wanted[name]) for name in wanted.joints},
+            self.efforts,
+            {name: self.wanted[name][0] for name in wanted.elements},
+            unknown,
+            unknown,
+        )
 
     @cached_property
     def _at(self) -> BodyStates:
@@ -170,8 +193,13 @@ class StaticModel:
         SolveError: nothing holds a body, or weight and springs have no equilibrium near the design.
     """
 
-    def __init__(self, mechanism: Mechanism, loads: Sequence[LoadPoint] = ()) -> None:
-        self.mechanism, self.equations = mechanism, StaticEquations(mechanism, loads)
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        loads: Sequence[LoadPoint] = (),
+        forces: Collection[str] = (),
+    ) -> None:
+        self.mechanism, self.equations = mechanism, StaticEquations(mechanism, loads, forces)
         self.drivers = [each.name for each in mechanism.drivers]
         vectors = self.equations.vectors
         names = [*self.equations.design, MULTIPLIERS]
@@ -222,12 +250,14 @@ class StaticModel:
             loads: force and torque by load point [N, N m], shape (n, 6).
             travel: values of held drivers from design [m or rad], shape (n,). Without loads and
                 travel there is one sample.
-            slopes: whether to compute compliance and stability, without which they are empty.
+            slopes: whether to compute compliance, stability and wanted forces, without which they
+                are empty.
         """
         n = next((len(each) for each in (*loads.values(), *travel.values())), 1)
         kept = [*self.equations.design, EFFORTS]
         if slopes:
-            kept += [name for name in self.equations.vectors if name.startswith(BY)] + ["tangent"]
+            kept += [name for name in self.equations.vectors if name.startswith((BY, FORCE))]
+            kept += ["tangent"]
         ends = [0, *np.cumsum([len(self.equations.vectors[name]) for name in kept]).tolist()]
         parts = [
             self._solve(
@@ -371,6 +401,7 @@ class StaticModel:
             least,
             unstable,
             iterations,
+            {k.removeprefix(FORCE): x for k, x in found.items() if k.startswith(FORCE)},
         )
 
     def _stability(self, entries: Array) -> tuple[Array, list[str]]:

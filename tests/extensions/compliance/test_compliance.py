@@ -120,6 +120,17 @@ def test_travel_unit_of_one_end_suffices(tmp_path, travel):
     assert found["loads"]["lateral"]["lateral"] == [-1000.0, 0.0, 1000.0]
 
 
+@pytest.mark.parametrize(
+    ("travel", "first", "count"),
+    [("10mm:3", -0.01, 3), ("10mm", -0.01, 25), ("0", 0.0, 1), ("0:10mm", 0.0, 25)],
+)
+def test_travel_is_spelled_as_in_run(tmp_path, travel, first, count):
+    out = tmp_path / "out.json"
+    assert main(["kc", strut_file(tmp_path), f"--travel={travel}", "--json", str(out)]) == 0
+    found = json.loads(out.read_text())["travel"]
+    assert (found[0], len(found)) == (first, count)
+
+
 def test_kc_constant_load_acts_over_travel(tmp_path):
     """Loads at the contact, as the data have them, with a drive on the wheel carrier."""
     row = STRUT["results"][2]
@@ -231,6 +242,7 @@ def test_load_beyond_equilibrium_is_counted(tmp_path, capsys):
         ("", "--travel=0:1", "START:STOP:SAMPLES"),
         ("", "--travel=0:1furlong:3", "START:STOP:SAMPLES"),
         ("", "--travel=nan:1:3", "START:STOP:SAMPLES"),
+        ("", "--travel=-30mm", "one sample is -30mm:-30mm:1"),
         ("", f"--out {__file__}", "cannot be made a folder"),
         ("", "--travel=0:3deg:3", "numbers in m or mm or cm"),
         ("", "--load lateral=0:3Nm:3", "numbers in N or kN"),
@@ -295,7 +307,7 @@ def test_bushing_file_for_hardpoint_table(tmp_path, capsys):
     C = np.array(found["compliance"][1])
     assert np.abs(C - C.T).max() <= 1e-12 * np.abs(C).max()
     assert C[1, 1] > 1e-8
-    assert main(["kc", str(table), *options, "--travel=30mm"]) == 0
+    assert main(["kc", str(table), *options, "--travel=30mm:30mm:1"]) == 0
     alone = json.loads(out.read_text())
     assert alone["travel"] == [0.03]
     assert alone["wheel_center"][0] == pytest.approx(found["wheel_center"][2], abs=1e-12)

@@ -1,5 +1,6 @@
 """Shims against the carrier's pose with links of given lengths, solved by Newton's method."""
 
+import json
 import math
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.hardpoints.shims import shims
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from ...oracles.rods import rotation
@@ -105,23 +107,78 @@ def test_tie_rod_moves_cancel_bump_steer(tmp_path, name):
         role: each.no_bump_steer for role, each in ends.items() if each.no_bump_steer is not None
     }
     assert found.keys() == {*RODS[name][-1]}
+    before = abs(bump_steer({}))
     for role, moves in found.items():
         for k, sign in enumerate((-1.0, -1.0, 1.0)):
-            up, down = (bump_steer({role: way * STEP * np.eye(3)[k]}) for way in (1, -1))
-            slope = sign * (up - down) / (2.0 * STEP)
-            assert moves[k] * slope == pytest.approx(-bump_steer({}), rel=1e-6), (role, k)
+            # metres of travel by round-off of the pose; moves of a metre leave long rods
+            assert abs(bump_steer({role: sign * moves[k] * np.eye(3)[k]})) < 1e-9 * before, (
+                role,
+                k,
+            )
+
+
+@pytest.mark.parametrize("name", [name for name, rods in RODS.items() if len(rods) == 5])
+def test_tie_rod_moves_equal_rod_formula(name):
+    """(l . v) / v_i of the inner end, v being the outer end's velocity at toe rate zero, found by
+    differences of the carrier on the other four rods.
+    """
+    at = {role: np.array(place) for role, place in TEMPLATES[name].sample.items()}
+    center, (*rods, (inner, outer)) = at["wheel_center"], RODS[name]
+    place = dict(TEMPLATES[name].sample)
+
+    def misfit(pose, height):
+        turn, s = rotation(pose[3:]), rotation(pose[3:]) @ np.array([0.0, 1.0, 0.0])
+        gaps = [
+            np.linalg.norm(center + pose[:3] + turn @ (at[b] - center) - at[a])
+            - np.linalg.norm(at[b] - at[a])
+            for a, b in rods
+        ]
+        return np.array([*gaps, pose[2] - height, np.arctan2(s[0], s[1])])
+
+    def outer_end(height):
+        pose = np.zeros(6)
+        for _ in range(8):
+            steps = 1e-6 * np.eye(6)
+            slopes = [(misfit(pose + d, height) - misfit(pose - d, height)) / 2e-6 for d in steps]
+            pose = pose - np.linalg.solve(np.transpose(slopes), misfit(pose, height))
+        return center + pose[:3] + rotation(pose[3:]) @ (at[outer] - center)
+
+    v = (outer_end(1e-4) - outer_end(-1e-4)) / 2e-4
+    _, found = shims(TEMPLATES[name], place, 0.0, 0.0)
+    # differences over 0.2 mm have an error of 1e-8 of the curvature
+    assert found[inner] == pytest.approx((at[outer] - at[inner]) @ v / v, rel=1e-5)
 
 
 def test_explain_prints_shims_in_degrees(tmp_path, capsys):
     main(["templates", "double_wishbone"])
     (tmp_path / "car.csv").write_text(capsys.readouterr().out)
-    assert main(["explain", str(tmp_path / "car.csv"), "--samples", "2"]) == 0
+    assert (
+        main(
+            [
+                "explain",
+                str(tmp_path / "car.csv"),
+                "--samples",
+                "2",
+                f"--json={tmp_path / 'told.json'}",
+            ]
+        )
+        == 0
+    )
     printed = capsys.readouterr().out
     assert "shims of 1 mm at design" in printed
     ends = {each.name: each.no_bump_steer for each in load(tmp_path / "car.csv").hardpoints}
-    for name in ("tierod_inner", "tierod_outer"):
-        rows = [line.split() for line in printed.splitlines() if line.startswith(f"{name} ")]
-        assert [name, *(f"{1e3 * x:+.1f}" for x in ends[name]), "mm"] in rows
+    rows = [line for line in printed.splitlines() if "deg/m" in line]
+    assert "(-8.7 deg/m now)" in rows[0]
+    for name, row in zip(("tierod_inner", "tierod_outer"), rows[1:], strict=False):
+        assert row.startswith(name)
+        for x in ends[name]:
+            assert f"{1e3 * x:+.1f}" in row
+        assert row.count("none in reach (") == sum(abs(x) > 0.05 for x in ends[name]) == 2
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert told["bump_steer"] == pytest.approx(math.radians(-8.7037), rel=1e-4)
+    for name, left in told["bump_steer_left"].items():
+        assert [x is None for x in left] == [abs(x) > 0.05 for x in told["no_bump_steer"][name]]
+        assert all(abs(x) < 1e-9 for x in left if x is not None)
     (row,) = [line for line in printed.splitlines() if line.startswith("uca_outer  ")]
     degrees = math.degrees(1e-3 * load(tmp_path / "car.csv").hardpoints[2].shim[1][1])
     assert f"{degrees:+.4f}" in row.split()

@@ -60,7 +60,7 @@ def test_study_dataset_and_summary_equal_json(tmp_path):
 
 
 def effect(gradient):
-    return abs(gradient["largest"]) * gradient["scale"]
+    return abs(gradient["largest"]) * gradient["deviation"]
 
 
 def gradients_of(found, name):
@@ -83,7 +83,7 @@ def test_printed_outputs_equal_json(shown):
     found, text, html = shown
     rows = rows_of(html, "Outputs")
     heads = ["unit", "least", "variant", "most", "variant", "largest st. dev.", "largest 1-99 %"]
-    heads += ["largest effect (gradient x scale)"]
+    heads += ["largest effect (gradient x st. dev.)"]
     for (name, each), (title, block) in zip(found["outputs"].items(), blocks(text), strict=False):
         least, most = MM * min(each["min"]), MM * max(each["max"])
         variants = each["min_variant"], each["max_variant"]
@@ -138,7 +138,9 @@ def test_page_gradients_equal_json(shown):
 
 
 def test_page_effects_equal_json(tmp_path):
-    found, _, html = study(tmp_path, "one_at_a_time")
+    found, text, html = study(tmp_path, "one_at_a_time")
+    assert "(gradient x offset)" in text
+    assert all(each["deviation"] == each["scale"] for each in found["gradients"])
     rows = html.rows("One at a time")
     for (name, offset, *cells), each in zip(rows, found["effects"], strict=True):
         assert_row([name, *offset.split()], [each["coordinate"], MM * each["offset"], "mm"])

@@ -1,5 +1,6 @@
 """Studies of designs: draws, chunks, and what is reduced."""
 
+import math
 from dataclasses import replace
 from io import StringIO
 from itertools import pairwise
@@ -404,6 +405,24 @@ def test_stratified_sampling_fills_every_interval(tmp_path, law, sampling, of_sc
     assert found.coordinates[0].law == Law(law)
     shares = np.sort(of_scipy.cdf(1e3 * found.offsets(3, 0, count)[0]))
     np.testing.assert_array_equal(np.floor(shares * count + 1e-9), np.arange(count))
+
+
+@pytest.mark.parametrize("law", TIP_LAWS)
+def test_standard_deviation_of_laws(tmp_path, law, of_scipy):
+    (coordinate,) = vary(tmp_path, crank(), tip=TIP_LAWS[law]).coordinates
+    assert 1e3 * coordinate.standard_deviation == pytest.approx(of_scipy.std(), rel=1e-12)
+    for bound, rel in ((1e-6, 1e-12), (0.1, 1e-12), (30.0, 1e-12)):
+        cut = replace(coordinate, law=Law.TRUNCATED_NORMAL, scale=1.0, bound=bound)
+        wanted = bound / math.sqrt(3.0) if bound < 1e-3 else stats.truncnorm.std(-bound, bound)
+        assert cut.standard_deviation == pytest.approx(wanted, rel=rel)
+
+
+def test_listed_offsets_rank_by_deviation(tmp_path):
+    tip = {"at": "tip", "values": [[0.0, 1.0], [-1.0, 0.0, 4.0], [0.0]]}
+    found = [
+        1e3 * x.standard_deviation for x in vary(tmp_path, crank(), "grid", tip=tip).coordinates
+    ]
+    assert found[:2] == pytest.approx([0.5, math.sqrt(14.0 / 3.0)])
 
 
 @pytest.mark.parametrize("law", ["truncated_normal", "triangular"])
