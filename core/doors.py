@@ -48,6 +48,7 @@ class Extension:
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
         sources: options added to commands that run engines; see `cli.engine_source.EngineSource`.
         writers: function that writes a mechanism in each format; see `case.io.model_writer`.
+        codes: function that returns the files of a solved case in a language, by their names.
         formats: who reads each format, for the help.
         converters: function from a model's file to the text that a simulator saves.
         views: HTML of a result or a mechanism in a notebook.
@@ -68,6 +69,7 @@ class Extension:
     sections: _Table = field(default_factory=dict[str, str])
     sources: _Table = field(default_factory=dict[str, str])
     writers: _Table = field(default_factory=dict[str, str])
+    codes: _Table = field(default_factory=dict[str, str])
     formats: _Table = field(default_factory=dict[str, str])
     converters: _Table = field(default_factory=dict[str, str])
     views: _Table = field(default_factory=dict[str, str])
