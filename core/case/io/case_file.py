@@ -13,7 +13,7 @@ from ...errors import CaseError, MechanismError, SolveError, unknown
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
-from .document import LONGEST_TEXT, Section, explained, fault, read_tables, shown, toml_table
+from .document import LONGEST_TEXT, Section, explained, fault, read_tables, shown
 from .mechanism_sections import (
     free_lines,
     mechanism_lines,
@@ -30,6 +30,7 @@ from .readers import LARGEST_FILE
 from .reference import read_reference, reason_against, reference_lines
 from .schema import SCHEMA, ClosureKeys, ReferenceKeys, UnitsKeys
 from .sections import case_keys, sections
+from .toml_text import toml_table
 
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
 MOST_PARTS = 60_000

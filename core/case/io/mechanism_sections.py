@@ -32,7 +32,7 @@ from ...mechanism.motions import (
 from ...trajectory import Array
 from ..case import MARKER, SLOW, TIME, Case, Free, Load, Resting, Rig, Sweep
 from ..units import RADIAN, SECOND, FileUnits, Unit, plain
-from .document import Section, explained, parse, read_text, shown, toml_table
+from .document import Section, explained, parse, read_text, shown
 from .reference import read_grid
 from .schema import (
     MOST_SAMPLES,
@@ -47,6 +47,7 @@ from .schema import (
     keys_of,
     own_fields,
 )
+from .toml_text import toml_table
 
 DRIVERS: Mapping[str, type[Driver]] = {
     cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)

@@ -26,10 +26,11 @@ from ..measures import (
 )
 from ..quantity import AXES, Derived, TypedQuantity, own_keys, with_markers
 from ..units import Convert
-from .document import Section, explained, toml_table
+from .document import Section, explained
 from .reference_samples import RATES
 from .schema import COORDINATE, OutputKeys, ToleranceKeys, keys_of
 from .sections import sections, types
+from .toml_text import toml_table
 
 # Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized
 # mechanisms at 1e-16 m.

@@ -36,7 +36,7 @@ from ..curves import (
     slopes,
 )
 from ..units import Convert, FileUnits, Unit
-from .document import fault, shown, toml_table
+from .document import fault, shown
 from .readers import WORKBOOKS
 from .reference_file import SAME_GRID, read, series, sha256
 from .reference_samples import (
@@ -50,6 +50,7 @@ from .reference_samples import (
     samples_of,
 )
 from .schema import DIGEST, ReferenceKeys
+from .toml_text import toml_table
 
 PROVED = ".json"
 """Suffix of the files of proved references."""

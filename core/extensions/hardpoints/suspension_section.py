@@ -11,10 +11,11 @@ import msgspec
 
 from ...algebra import vec
 from ...case.case import Case, size
-from ...case.io.document import Section, shown, toml_table
+from ...case.io.document import Section, shown
 from ...case.io.outputs import check_point, direction, tolerance
 from ...case.io.schema import keys_of
 from ...case.io.sections import CaseSection
+from ...case.io.toml_text import toml_table
 from ...case.quantity import Quantity, TypedQuantity, own_keys
 from ...errors import CaseError
 from ...joints.base import unit

@@ -18,8 +18,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
-from ...case.io.document import fault, parse, parse_yaml, shown, unknown_name
+from ...case.io.document import fault, parse, shown, unknown_name
 from ...case.io.table import is_number
+from ...case.io.toml_text import parse_yaml
 from ...case.units import LENGTHS
 from ...errors import brief, remedy, shortened
 from ...mechanism.mechanism import Vector

@@ -25,7 +25,7 @@ from ...case.io.element import LEFT, TAKEN, ZEROS, Apart, Element, Names, parse_
 from ...case.io.readers import LARGEST_FILE
 from ...errors import KincheckError
 from ...extras import library
-from ...joints import PiecewisePolynomial, Spline
+from ...joints import PiecewisePolynomial
 from ...mechanism.loads import Law
 from ..trees.graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
 from ..trees.masses import mass_in
@@ -41,8 +41,8 @@ from ..trees.tree import (
     Spring,
     Strut,
     Tree,
-    require_spline,
 )
+from .curves import ZERO, curve_of, function, is_own, polynomial
 
 VERSION_4 = 40_000
 """Oldest version of documents that are read as they are."""
@@ -64,10 +64,6 @@ CUSTOM, SPACE = "CustomJoint", "SpatialTransform"
 AXES = words("translation1 translation2 translation3 rotation1 rotation2 rotation3")
 CONSTRAINTS = words(
     "PointConstraint WeldConstraint ConstantDistanceConstraint CoordinateCouplerConstraint"
-)
-FUNCTIONS = (
-    *words("Constant LinearFunction PolynomialFunction MultiplierFunction"),
-    *words("SimmSpline PiecewiseLinearFunction"),
 )
 APART = Apart(
     "OpenSim",
@@ -111,8 +107,6 @@ GRAVITY = (0.0, -9.80665, 0.0)
 BY_RATES = "its turning damping is by the angular velocity, and in OpenSim by rates of angles"
 """Gravity unless given [m/s^2]."""
 DEEPEST_FRAME = 50
-ON_LINE = 1e-12
-"""Distance of points from a line, over the largest value, that rounding in doubles leaves."""
 
 
 def whole_osim(root: Element) -> Element:
@@ -354,7 +348,7 @@ class _Reader:
         own = coordinate.child_number("default_value", 0.0)
         if (motion := _prescribed(coordinate)) is None:
             return own
-        first, *more = _function(motion).powers
+        first, *more = function(motion).powers
         value, *slopes = first
         if more or slopes:
             raise coordinate.fault(
@@ -386,11 +380,11 @@ class _Reader:
         given = {each.require("name"): each for each in space.findall("TransformAxis")}
         curves: dict[str, tuple[str, PiecewisePolynomial]] = {}
         for each in AXES:
-            curves[each] = _curve(given[each], coordinates) if each in given else ("", _ZERO)
+            curves[each] = curve_of(given[each], coordinates) if each in given else ("", ZERO)
         leads = {
             coordinate: each
             for each in (*AXES[:3], *AXES[3:])
-            if (coordinate := curves[each][0]) and _is_own(curves[each][1])
+            if (coordinate := curves[each][0]) and is_own(curves[each][1])
         }
         used = {coordinate for coordinate, _ in curves.values()}
         for coordinate, own in coordinates.items():
@@ -408,7 +402,7 @@ class _Reader:
             if k == 3:  # a hinge of the coordinate, and one back
                 for free in [x for x in coordinates if x not in leads]:
                     freedoms.append(self._freedom(coordinates[free], "hinge", X))
-                    follow(f"{free}.back", "hinge", X, free, _polynomial(0.0, -1.0))
+                    follow(f"{free}.back", "hinge", X, free, polynomial(0.0, -1.0))
             coordinate, curve = curves[each]
             kind: Kind = "slide" if k < 3 else "hinge"
             axis = (X, Y, Z)[k % 3]
@@ -479,7 +473,7 @@ class _Reader:
         if len(functions) != 1:
             raise element.fault("coupled_coordinates_function: expected one function; correct it")
         if len(leaders) == 1:
-            curve = _function(functions[0]).scaled(1.0, scale)
+            curve = function(functions[0]).scaled(1.0, scale)
             self._follow(name, follower, leaders[0], curve, element)
             return
         if functions[0].tag != "LinearFunction":
@@ -558,90 +552,6 @@ class _Reader:
     ) -> None:
         name = element.require("name")
         self.graph.struts.append(Strut(name, links, places, law, element, element.tag))
-
-
-def _polynomial(*coefficients: float) -> PiecewisePolynomial:
-    """Return a polynomial, the constant first, without zeros at its end."""
-    trimmed = Polynomial(coefficients).trim()
-    return PiecewisePolynomial((0.0,), (tuple(trimmed.coef.tolist()),))
-
-
-_ZERO = _polynomial(0.0)
-
-
-def _is_own(curve: PiecewisePolynomial) -> bool:
-    """Return whether a curve is a line of slope 1 or -1."""
-    powers = curve.powers[0]
-    return not curve.knots and len(powers) == 2 and abs(powers[1]) == 1.0
-
-
-def _curve(axis: Element, coordinates: Mapping[str, Element]) -> tuple[str, PiecewisePolynomial]:
-    """Return the coordinate of an axis of a custom joint, empty without one, and its curve."""
-    names = axis.child_text("coordinates").split()
-    around = axis.child("function")
-    functions = [
-        each.take() for each in (around or axis).children if each.tag not in ("coordinates", "axis")
-    ]
-    if not functions and not names:
-        return "", _ZERO
-    if len(functions) != 1 or len(names) > 1:
-        raise axis.fault(
-            f"found {len(functions)} functions of {len(names)} coordinates, expected one of one;"
-            " correct it"
-        )
-    curve = _function(functions[0])
-    moves = len(curve.powers[0]) > 1
-    if not (moves and names):
-        if moves:
-            raise axis.fault("has no coordinate, expected one for its function; add it")
-        return "", curve
-    if names[0] not in coordinates:
-        raise axis.unknown_name("coordinates", names[0], coordinates, "a coordinate of the joint")
-    return names[0], curve
-
-
-def _function(element: Element) -> PiecewisePolynomial:
-    """Return a function of one coordinate."""
-    match element.tag:
-        case "Constant":
-            return _polynomial(element.child_number("value", 0.0))
-        case "LinearFunction":
-            return _polynomial(*element.value("coefficients", 2)[::-1])
-        case "PolynomialFunction":
-            count = len(element.child_text("coefficients").split())
-            return _polynomial(*element.value("coefficients", max(count, 1))[::-1])
-        case "MultiplierFunction":
-            scale = element.child_number("scale", 1.0)
-            around = element.child("function")
-            inner = [each.take() for each in (around or element).children if each.tag != "scale"]
-            if len(inner) != 1:
-                raise element.fault(f"found {len(inner)} functions, expected one; correct it")
-            found = _function(inner[0]).scaled(1.0, scale)
-            return found if found.knots else _polynomial(*found.powers[0])
-        case "SimmSpline" | "PiecewiseLinearFunction":
-            return _table(element)
-        case _:
-            raise element.fault(
-                f"is a {element.tag}, a curve for which there is no joint, expected one of"
-                f" {', '.join(FUNCTIONS)}; fit a SimmSpline"
-            )
-
-
-def _table(element: Element) -> PiecewisePolynomial:
-    """Return the function through points, a line where they are on one."""
-    count = max(len(element.child_text("x").split()), 2)
-    x, y = (element.value(key, count) for key in "xy")
-    points = tuple(zip(x, y, strict=True))
-    require_spline(element, points)
-    slope = (y[-1] - y[0]) / (x[-1] - x[0])
-    off = max(abs(b - y[0] - slope * (a - x[0])) for a, b in points)
-    if off <= ON_LINE * max(map(abs, y)):
-        return _polynomial(y[0] - slope * x[0], slope)
-    if element.tag == "PiecewiseLinearFunction":
-        raise element.fault(
-            "has corners, where velocities jump, expected points on one line; give a SimmSpline"
-        )
-    return Spline("spline", ("driven", "driving"), points).function
 
 
 def _turn(angles: Sequence[float]) -> Quat:

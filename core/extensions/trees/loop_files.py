@@ -40,8 +40,9 @@ from typing import Annotated, Any, Literal, cast
 import msgspec
 
 from ...algebra import Vec3, X, Y, Z, cross, quat, vec
-from ...case.io.document import fault, parse, parse_yaml, read_text, shown, unknown_name, usable
+from ...case.io.document import fault, parse, read_text, shown, unknown_name, usable
 from ...case.io.element import Element, unit_vector
+from ...case.io.toml_text import parse_yaml
 from ...errors import WARNING, CaseError, remedy, shortened, similar
 from ...joints.base import triad
 from ...joints.polynomial import HIGHEST
