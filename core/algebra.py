@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias, TypeGuard, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 Scalar: TypeAlias = Any
 """A number of any kind with + - * / and unary minus."""
@@ -42,12 +43,28 @@ def is_literal_zero(a: Scalar) -> bool:
     return isinstance(a, int | float) and a == 0
 
 
+def is_array(a: Any) -> TypeGuard[NDArray[Any]]:
+    """Return whether a scalar is an array of lanes."""
+    return isinstance(a, np.ndarray)
+
+
 def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
-    """Return p if |a| > |b|, else q; a traced number decides at run time."""
+    """Return p if |a| > |b|, else q; a traced number decides at run time, lanes each by their own
+    values in double precision.
+    """
     later = next((x for x in (a, b) if hasattr(x, "where_larger")), None)
     if later is not None:
         return later.where_larger(a, b, p, q)
+    if is_array(a) or is_array(b):
+        first, second = (np.abs(np.asarray(x, dtype=np.float64)) for x in (a, b))
+        return cast("NDArray[Any]", np.where(first > second, p, q))
     return p if abs(a) > abs(b) else q
+
+
+def arc_tangent(y: Scalar, x: Scalar) -> Scalar:
+    """Return the angle of the direction (x, y) [rad], in -pi..pi, of numbers or of lanes."""
+    later = next((each for each in (y, x) if hasattr(each, "arc_tangent")), None)
+    return np.arctan2(y, x) if later is None else later.arc_tangent(y, x)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,21 +1,20 @@
 """Jets: a number with its first and second time derivative, so any formula gives exact rates of its
 result.
 
-Vectors of jets are `algebra.Vec3`. An unknown derivative is NaN, and propagates.
+The numbers are scalars of any kind: lanes, balls, traced scalars. Vectors of jets are
+`algebra.Vec3`. An unknown derivative is NaN, and propagates.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .algebra import Vec3
-
-Lanes: TypeAlias = NDArray[np.float64]
+from .algebra import Scalar, Vec3, arc_tangent, is_array, root, where_larger
 
 VANISHING = 2.0**-20
 """A length below this part of the numbers it is made of has lost six digits of its direction, and
@@ -25,21 +24,22 @@ so of its rates: they keep the nine to ten that tolerances ask for.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Jet:
-    """Value, first and second derivative by time, each of shape (n,) or (). Operators follow the
-    rules of differentiation.
+    """Value, first and second derivative by time; lanes are of shape (n,) or (). Operators follow
+    the rules of differentiation.
     """
 
     __array_ufunc__: ClassVar[None] = None  # an array plus a jet is a jet, not an array of jets
-    x: Lanes
-    v: Lanes
-    a: Lanes
+    x: Scalar
+    v: Scalar
+    a: Scalar
 
     @property
     def dot(self) -> Jet:
         """The time derivative as a jet; its second derivative is unknown (NaN)."""
-        return Jet(self.v, self.a, np.full_like(self.a, np.nan))
+        unknown = np.full_like(self.a, np.nan) if is_array(self.a) else math.nan
+        return Jet(self.v, self.a, unknown)
 
-    def __add__(self, b: Jet | float | Lanes) -> Jet:
+    def __add__(self, b: Jet | Scalar) -> Jet:
         return (
             Jet(self.x + b.x, self.v + b.v, self.a + b.a)
             if isinstance(b, Jet)
@@ -51,10 +51,10 @@ class Jet:
     def __neg__(self) -> Jet:
         return Jet(-self.x, -self.v, -self.a)
 
-    def __sub__(self, b: Jet | float | Lanes) -> Jet:
+    def __sub__(self, b: Jet | Scalar) -> Jet:
         return self + -b
 
-    def __rsub__(self, b: float | Lanes) -> Jet:
+    def __rsub__(self, b: Scalar) -> Jet:
         return -self + b
 
     def __mul__(self, b: Any) -> Jet:
@@ -80,7 +80,7 @@ class Jet:
 
 def sqrt(a: Jet) -> Jet:
     """Return the square root; a must be positive."""
-    x = np.sqrt(a.x)  # x x = a, differentiated once and twice
+    x = root(a.x)  # x x = a, differentiated once and twice
     v = a.v / (2.0 * x)
     return Jet(x, v, (a.a - 2.0 * v * v) / (2.0 * x))
 
@@ -92,27 +92,36 @@ def arctan2(y: Jet, x: Jet) -> Jet:
     more by the quotient rule.
     """
     rate = (x * y.dot - y * x.dot) / (x * x + y * y)
-    return Jet(np.arctan2(y.x, x.x), rate.x, rate.v)
+    return Jet(arc_tangent(y.x, x.x), rate.x, rate.v)
 
 
-def doubles(a: Jet) -> Lanes:
-    """Return the value as doubles, whatever its numbers are."""
-    return np.asarray(a.x).astype(np.float64)
+def choose(a: Scalar, b: Scalar, p: Jet, q: Jet) -> Jet:
+    """Return the jet p if |a| > |b|, else q."""
+    pairs = ((p.x, q.x), (p.v, q.v), (p.a, q.a))
+    return Jet(*(where_larger(a, b, *pair) for pair in pairs))
 
 
-def where(known: NDArray[np.bool_], a: Jet) -> Jet:
-    """Return the jet, NaN where it is not known."""
-    return Jet(*(np.where(known, part, np.nan) for part in (a.x, a.v, a.a)))
+UNKNOWN = Jet(math.nan, math.nan, math.nan)
 
 
-def norm(a: Vec3, size: Lanes | float) -> Jet:
+def known(a: Scalar, b: Scalar, value: Jet) -> Jet:
+    """Return the jet if |a| > |b|; otherwise it is unknown."""
+    return choose(a, b, value, UNKNOWN)
+
+
+def sign(a: Scalar) -> Scalar:
+    """Return 1 or -1, with the sign of a number that is not zero."""
+    return abs(a) / a
+
+
+def norm(a: Vec3, size: Scalar) -> Jet:
     """Return the length of a vector of jets. Its rates are NaN where it almost vanishes.
 
     Args:
         size: of the numbers that the vector is a sum of.
     """
     length = sqrt(a @ a)
-    rates = where(doubles(length) > VANISHING * size, length)
+    rates = known(length.x, VANISHING * size, length)
     return Jet(length.x, rates.v, rates.a)
 
 

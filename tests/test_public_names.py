@@ -40,8 +40,9 @@ def test_import_loads_names_only():
 
 
 BY_NAME = (
-    *("check_engine", "compare", "compliance", "explain", "free", "live", "load"),
-    *("primitives", "report", "run", "sweep", "Assemblies", "Assembly", "find_assemblies"),
+    *("check_engine", "compare", "compliance", "curves", "curves_by_chunk", "explain", "free"),
+    *("live", "load", "primitives", "report", "run", "sweep"),
+    *("Assemblies", "Assembly", "DesignCurves", "find_assemblies"),
 )
 VARY = """schema = "kincheck-vary/1"
 mode = "monte_carlo"

@@ -22,9 +22,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..algebra import Vec3, X, Y, cross, quat, triple, vec
+from ..algebra import Vec3, X, Y, cross, quat, root, triple, vec, where_larger
 from ..errors import MechanismError, unknown
-from ..jet import Jet, arctan2, doubles, norm, sqrt
+from ..jet import Jet, arctan2, choose, norm, sqrt
 from ..joints.base import triad, unit
 from ..mechanism.mechanism import GROUND, Mechanism, Point, Vector
 from ..mechanism.motions import JointDriver, PointCoordinate
@@ -50,9 +50,14 @@ def euler_parameters(x: Vec3, y: Vec3) -> list[Jet]:
         [z.x - x.z, x.y + y.x, 1.0 - x.x + y.y - z.z, y.z + z.y],
         [x.y - y.x, z.x + x.z, y.z + z.y, 1.0 - x.x - y.y + z.z],
     ]
-    largest = np.argmax([doubles(products[k][k]) for k in range(4)], axis=0)
-    own = sqrt(_select(largest, [products[k][k] for k in range(4)]))
-    return [_select(largest, products[i]) / (2.0 * own) for i in range(4)]
+    largest, row = products[0][0], products[0]
+    for k in range(1, 4):
+        size = products[k][k]
+        # products are symmetric
+        row = [choose(size.x, largest.x, p, q) for p, q in zip(products[k], row, strict=True)]
+        largest = choose(size.x, largest.x, size, largest)
+    own = sqrt(largest)
+    return [each / (2.0 * own) for each in row]
 
 
 def smallest(e: Sequence[Jet], within: float = 0.0) -> list[Jet]:
@@ -72,7 +77,7 @@ def with_signs(sign: Array, e: Sequence[Jet]) -> list[Jet]:
 
 def floats(e: Sequence[Jet]) -> Array:
     """Return the values of jets as doubles, shape (4, n, ...)."""
-    return np.array([doubles(each) for each in e])
+    return np.array([np.asarray(each.x).astype(np.float64) for each in e])
 
 
 def angular_velocity(e: Sequence[Jet]) -> Array:
@@ -89,9 +94,9 @@ def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
     square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
     # exact numbers, which are objects, have digits enough for the quotient
     rounded = np.asarray(square.x).dtype != object
-    small = (doubles(square) < _SMALL) & (doubles(e0) > 0.0) & rounded
-    root = sqrt(_select(small.astype(int), [square, e0 * e0]))  # any number where it is small
-    quotient = 2.0 * arctan2(root, e0) / root
+    small = (floats([square])[0] < _SMALL) & (floats([e0])[0] > 0.0) & rounded
+    size = sqrt(_select(small.astype(int), [square, e0 * e0]))  # any number where it is small
+    quotient = 2.0 * arctan2(size, e0) / size
     series, coefficient = 0.0 * square, 2.0
     power = 0.0 * square + 1.0
     for k in range(_TERMS):  # of 2 arcsin(r) / r
@@ -246,9 +251,9 @@ class Orientation(Measure):
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the component of the smallest rotation, [rad] or [-]."""
-        return self.component_of(smallest(self.parameters(at, design)))
+        return self.component_of(smallest(self.terms(at, design)))
 
-    def parameters(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> list[Jet]:
+    def terms(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Sequence[Jet]:
         """Return Euler parameters of the rotation since design, either sign."""
         place, *tips = self.points
         x, y = ((1.0 / length(design, place, tip)) * (at[tip] - at[place]) for tip in tips)
@@ -401,8 +406,8 @@ class Distance(Measure):
 
     def _distance(self, at: Mapping[str, Vec3]) -> Jet:
         first, second = (at[name] for name in self.between)
-        size = np.maximum(*(doubles(norm(each, 0.0)) for each in (first, second)))
-        return norm(second - first, size)
+        sizes = [norm(each, 0.0).x for each in (first, second)]
+        return norm(second - first, where_larger(*sizes, *sizes))
 
 
 @dataclass(frozen=True)
@@ -456,5 +461,5 @@ class Angle(Measure):
     def _angle(self, at: Mapping[str, Vec3]) -> Jet:
         first, a, second, b = (at[name] for name in self.points)
         a, b = a - first, b - second
-        size = np.sqrt(doubles(a @ a) * doubles(b @ b))
+        size = root((a @ a).x * (b @ b).x)
         return arctan2(norm(cross(a, b), size), a @ b)

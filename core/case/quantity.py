@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 
-from ..algebra import Vec3
-from ..jet import Jet
+from ..algebra import Scalar, Vec3
+from ..jet import Jet, known
 from ..mechanism.mechanism import Mechanism, Point, Vector
 from ..trajectory import MARKER as MARKER
 from ..trajectory import PointMotion
@@ -51,6 +51,7 @@ class Quantity(Protocol):
         why: reason for the tolerance.
         sense: meaning of a positive value; empty if name and unit state it.
         signs: convention of signs and axes; empty if only the case's own axes apply.
+        undefined: reason why solved samples have no value; empty if all have.
         facts: properties for readers of results.
     """
 
@@ -76,6 +77,8 @@ class Quantity(Protocol):
     def signs(self) -> str: ...
     @property
     def facts(self) -> Mapping[str, Any]: ...
+    @property
+    def undefined(self) -> str: ...
 
     @property
     def period(self) -> float: ...
@@ -87,11 +90,51 @@ class Quantity(Protocol):
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the quantity over the samples; unknown values are NaN.
 
+        This is its equation, over scalars of any kind: lanes, balls, traced scalars.
+
         Args:
             at: global positions of its points as jets [m].
             design: the same at the design position, at rest.
         """
         ...
+
+    def terms(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Sequence[Jet]:
+        """Return what it follows from over a sweep: itself, or the Euler parameters of a body,
+        whose sign is known over a sweep only.
+        """
+        ...
+
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar] | None:
+        """Return squares of two speeds: samples have no value where the first is negligible
+        against the second over the sweep; see `where_moving`. None for an output of poses.
+        """
+        ...
+
+
+# Samples with a speed below this fraction of the fastest point's speed are left out: a quotient by
+# the speed has lost three digits of its rates there, and more at lower speeds.
+STILL = 1e-3
+
+
+def where_moving(quotient: Jet, speeds: tuple[Any, Any] | None) -> Jet:
+    """Return a quotient by a speed, NaN at samples where this speed is negligible.
+
+    The largest speed is over the samples, not over lanes: lanes may hold variants of a design,
+    which must not be judged by one another.
+
+    Args:
+        speeds: as `Quantity.resting` gives them; samples along the first axis.
+    """
+    if speeds is None:
+        return quotient
+    own, fastest = (np.asarray(each, dtype=np.float64) for each in speeds)
+    limit = np.broadcast_to(STILL**2 * np.fmax.reduce(fastest, axis=0, initial=0.0), own.shape)
+    return quotient if (own > limit).all() else known(own, limit, quotient)
+
+
+def known_at(output: Quantity, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+    """Return an output over the samples, its turns not counted, NaN where it has no value."""
+    return where_moving(output.of(at, design), output.resting(at))
 
 
 def point_jets(motion: PointMotion) -> Vec3:
@@ -117,7 +160,7 @@ output, or none.
 """
 
 
-class PoseQuantity:
+class PoseQuantity(ABC):
     """Properties of a quantity of the pose, see `Quantity`, unless its class has others."""
 
     @property
@@ -129,6 +172,11 @@ class PoseQuantity:
     def orders(self) -> int:
         """Value, rate and second rate."""
         return ORDERS
+
+    @property
+    def undefined(self) -> str:
+        """Empty: it has a value at every pose."""
+        return ""
 
     @property
     def period(self) -> float:
@@ -144,20 +192,36 @@ class PoseQuantity:
         """Return nothing: it reads points of the mechanism alone."""
         return ()
 
+    @abstractmethod
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """Return the quantity over the samples; see `Quantity.of`."""
 
-class TypedQuantity(PoseQuantity, ABC):
+    def terms(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Sequence[Jet]:
+        """Return the quantity alone."""
+        return (self.of(at, design),)
+
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar] | None:
+        """Return None: it is an output of poses."""
+        return None
+
+
+class TypedQuantity(PoseQuantity):
     """A quantity with a type in case files; a subclass with a type registers itself.
 
     Attributes:
         type: name in case files.
         measure: SI unit: m, rad, or 1.
         positive: meaning of a positive value.
+        needs: what is optional in the table of the type, and required here.
+        further: further keys in case files beyond the fields of the class: type and default.
         registry: classes by type.
     """
 
     type: ClassVar[str]
     measure: ClassVar[str]
     positive: ClassVar[str]
+    needs: ClassVar[tuple[str, ...]] = ()
+    further: ClassVar[Mapping[str, tuple[Any, Any]]] = {}
     registry: ClassVar[dict[str, Any]]
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -169,6 +233,11 @@ class TypedQuantity(PoseQuantity, ABC):
     def unit(self) -> str:
         """Unit of the type."""
         return self.measure
+
+    @property
+    def side(self) -> str:
+        """Side of the vehicle that it is of, left or right; empty if of none."""
+        return ""
 
     @property
     def sense(self) -> str:
@@ -185,10 +254,6 @@ class TypedQuantity(PoseQuantity, ABC):
         }
         return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
-    @abstractmethod
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the quantity over the samples; see `Quantity.of`."""
-
 
 def own_keys(cls: type[Any]) -> list[Field[Any]]:
     """Return the fields of a typed quantity beyond the common ones, which case files give."""
@@ -196,6 +261,35 @@ def own_keys(cls: type[Any]) -> list[Field[Any]]:
     return [
         each for each in fields(cls) if each.name not in common and not each.metadata.get("hidden")
     ]
+
+
+class Derived(PoseQuantity):
+    """A quantity derived from an output, with its tolerance; the reader of a case file adds it."""
+
+
+class Convention(StrEnum):
+    """Standard of the axes and signs of outputs. SAE J670 also allows z up; here its name means the
+    historical z down.
+    """
+
+    ISO_8855 = "iso8855"
+    SAE_J670 = "sae_j670"
+
+    @property
+    def words(self) -> str:
+        """Standard and its axes, in words."""
+        return (
+            "ISO 8855 (x forward, y left, z up)"
+            if self is Convention.ISO_8855
+            else "SAE J670 (x forward, y right, z down)"
+        )
+
+    @property
+    def up(self) -> int:
+        """Factor from an upward component to one along z, and from a leftward component to one
+        along y.
+        """
+        return 1 if self is Convention.ISO_8855 else -1
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ sweeps from the way there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,29 +26,44 @@ from ..mechanism.motions import Path
 from ..trajectory import Array
 from .measures import JointAngle, Orientation
 from .pose_measures import angular_velocity, floats, with_signs
-from .quantity import Quantity
+from .quantity import Quantity, where_moving
+
+Completion: TypeAlias = Callable[[Sequence[Jet]], Jet]
 
 
-def count_output_turns(
+def over_sweep(
+    mechanism: Mechanism,
+    path: Path,
+    output: Quantity,
+    terms: Sequence[Jet],
+    speeds: tuple[Array, Array] | None,
+) -> Completion:
+    """Return what makes an output of its terms over the samples of a path: it adds the turns of an
+    angle since design, gives Euler parameters the sign that goes on from there, and leaves out
+    samples at rest. It serves other derivatives of the same terms too.
+
+    Args:
+        terms, speeds: of the output, see `Quantity`; samples along the first axis.
+    """
+    if isinstance(output, Orientation):
+        sign = signs_of(mechanism, path, output, terms)
+        return lambda e: output.component_of(with_signs(sign, e))
+    if not output.period:
+        return lambda given: where_moving(given[0], speeds)
+    turned = output.period * turns_of(mechanism, path, output, terms[0].x, terms[0].v)
+    return lambda given: given[0] + turned
+
+
+def output_over_sweep(
     mechanism: Mechanism,
     path: Path,
     output: Quantity,
     at: Mapping[str, Vec3],
     design: Mapping[str, Vec3],
 ) -> Jet:
-    """Return an output over the samples of a path: an angle or an orientation with its turns since
-    design, any other output as it is.
-
-    Args:
-        at, design: see `Quantity.of`; samples along the first axis.
-    """
-    if isinstance(output, Orientation):
-        return orient_from_design(mechanism, path, output, at, design)
-    angle = output.of(at, design)
-    if not output.period:
-        return angle
-    count = turns_of(mechanism, path, output, angle.x, angle.v)
-    return Jet(angle.x + output.period * count, angle.v, angle.a)
+    """Return an output over the samples of a path, from its points; see `Quantity.of`."""
+    terms, speeds = output.terms(at, design), output.resting(at)
+    return over_sweep(mechanism, path, output, terms, speeds)(terms)
 
 
 def turns_of(
@@ -80,24 +96,22 @@ def turns_of(
     return turns(x - near, np.full_like(x, np.nan), output.period, part)
 
 
-def orient_from_design(
+def signs_of(
     mechanism: Mechanism,
     path: Path,
     output: Orientation,
-    at: Mapping[str, Vec3],
-    design: Mapping[str, Vec3],
+    e: Sequence[Jet],
     samples: NDArray[np.intp] | slice = slice(None),
-) -> Jet:
-    """Return the orientation of a body, the sign of its Euler parameters continuous from design.
+) -> Array:
+    """Return the signs of the Euler parameters of a body, continuous from design.
 
     Samples near each other tell it by the angular velocities. Otherwise the native solver follows
     the body on the way from the design, and the sign is the one nearer to that.
 
     Args:
-        at, design: see `Quantity.of`; samples along the first axis.
+        e: its terms; samples along the first axis.
         samples: indices of these among the samples of the path.
     """
-    e = output.parameters(at, design)
     part = _at(path, samples)
     values = floats(e)
     sign, doubt = signs(values, angular_velocity(e), part)
@@ -108,7 +122,7 @@ def orient_from_design(
         if near is not None:
             near = near.T.reshape(4, -1, *(1,) * (values.ndim - 2))
             sign = np.where((near * values).sum(axis=0) < 0.0, -1.0, 1.0)
-    return output.component_of(with_signs(sign, e))
+    return sign
 
 
 def _at(path: Path, samples: NDArray[np.intp] | slice) -> Path:

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from ..case.case import HELD_BUT, ORDERS, Case, Quantity, Series, pace
 from ..case.measures import ForceMeasure
 from ..case.quantity import point_jets, still_jets
-from ..case.turns import count_output_turns
+from ..case.turns import output_over_sweep
 from ..errors import CaseError, number_of
 from ..trajectory import PER_TIME, QUANTITIES, Array, Trajectory
 from ..unit_text import motion_word, value_text
@@ -70,7 +70,7 @@ def output_series(
     # NaN marks unknown values, and spreads to all results that depend on them
     with np.errstate(all="ignore"):
         design = {name: still_jets(case.mechanism.point(name).position) for name in output.points}
-        jet = count_output_turns(case.mechanism, case.sweep.path, output, at, design)
+        jet = output_over_sweep(case.mechanism, case.sweep.path, output, at, design)
     solved = trajectory.solved
     position, *rates = (
         np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a)

@@ -17,17 +17,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..algebra import Vec3
 from ..dataset import Dataset, Variable
 from ..driving import Driving, in_words
 from ..errors import SolveError, number_of
 from ..input_checks import no_such, real
+from ..jet import Jet
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion, Path
 from ..program import ITERATIONS
 from ..tabular import Tabular
-from ..trajectory import QUANTITIES, Array, PointMotion, as_variables
+from ..trajectory import QUANTITIES, Array, PointMotion, Trajectory, as_variables
 from .compiled.compiled_model import Executor, Model
-from .compiled.request import LARGEST, SIGMA, SMALLEST, accept_by
+from .compiled.request import (
+    LARGEST,
+    OUTPUT,
+    RESTING,
+    SIGMA,
+    SLOPE_OF,
+    SMALLEST,
+    TOWARDS,
+    WantedOutput,
+    accept_by,
+    slots_of,
+)
 from .compiled.routes import SAME_TIME, Route, recent_route
 from .continuation.walk import FINER, ROOM, follow_samples
 from .formulation.acceptance_criteria import is_uncertain
@@ -160,6 +173,41 @@ def solve_variants(route: Route, geometry: Array, tol: float, *, alone: bool = T
     )
 
 
+# Lanes that slopes are computed of at once: in the second-level cache.
+LANES = 512
+
+
+def slopes_of(route: Route, found: Variants, geometry: Array, towards: Array) -> dict[str, Array]:
+    """Return the slopes of outputs; see `PreparedDesigns.slopes`."""
+    model, (n, count) = route.model, found.solved.shape
+    outputs = [name for name in model.vectors if name.startswith(SLOPE_OF)]
+    state = [*model.state]
+    poses = np.concatenate([found.kept[model.rows[name]] for name in state]).reshape(-1, n * count)
+    drives = np.repeat(model.samples(route.path, route.path.times), count, axis=1)
+    shifts = slots_of(model.vectors, (TOWARDS + place for place in model.varied))
+    slots = slots_of(model.vectors, outputs)
+    table = np.full((towards.shape[1], len(slots), n * count), np.nan)
+    for first in range(0, n * count, LANES):
+        some = np.arange(first, min(first + LANES, n * count))
+        lanes = np.resize(some, min(LANES, n * count))  # the executor of as many is kept
+        executor = model.executor(len(lanes))
+        executor.clear()
+        executor.put(slots_of(model.vectors, state), poses[:, lanes])
+        executor.put(model.sampled[: len(drives)], drives[:, lanes])
+        executor.put(model.geometry, geometry[:, lanes % count])
+        executor.run("prepare")
+        executor.run("outputs")
+        for k, motion in enumerate(towards.T):
+            executor.put(shifts, motion[:, None])
+            executor.run("slopes")
+            table[k][:, some] = executor.get(slots)[:, : len(some)]
+    table[:, :, ~found.solved.ravel()] = np.nan
+    table = table.reshape(len(table), len(slots), n, count)
+    sizes = np.cumsum([len(model.vectors[name]) for name in outputs])[:-1]
+    parts = np.split(table, sizes, axis=1)
+    return {name.removeprefix(SLOPE_OF): each for name, each in zip(outputs, parts, strict=True)}
+
+
 def _by_itself(route: Route, numbers: Array, tol: float) -> tuple[Array, NDArray[np.bool_], str]:
     """Return the kept rows of a variant solved alone, as any mechanism of its size, by time; the
     solved samples, and the reason of missing ones.
@@ -167,23 +215,53 @@ def _by_itself(route: Route, numbers: Array, tol: float) -> tuple[Array, NDArray
     model, n = route.model, len(route.path.times)
     kept = np.full((model.kept, n), np.nan)
     try:
-        found = prepare(variant_of(model, numbers), replace(model.request, varied=()), route.path)(
-            tol
-        )
+        variant, request = variant_of(model, numbers), model.request
+        read = [name for each in request.outputs for name in each.equation.points]
+        points = tuple(dict.fromkeys((*request.points, *read)))
+        alone = replace(request, varied=(), points=points, outputs=())
+        found = prepare(variant, alone, route.path)(tol)
     except SolveError as error:
         return kept, np.zeros(n, dtype=np.bool_), str(error)
     for name, motion in found.points.items():
         for label, values in zip(
             QUANTITIES, (motion.position, motion.velocity, motion.acceleration), strict=True
         ):
-            if values is not None:
+            if values is not None and f"{label} {name}" in model.rows:
                 kept[model.rows[f"{label} {name}"]] = values.T
+    for name, values in _outputs_of(request.outputs, variant, found).items():
+        kept[model.rows[name]] = values
     kept[model.rows["closure"]], kept[model.rows[ITERATIONS]] = (
         found.residual / model.frame.unit,
         found.iterations,
     )
     kept[:, ~found.solved] = np.nan
     return kept[:, route.by_time], found.solved[route.by_time], found.message
+
+
+def _outputs_of(
+    outputs: Sequence[WantedOutput], mechanism: Mechanism, found: Trajectory
+) -> dict[str, Array]:
+    """Return the terms of outputs of the motion itself, and the speeds at which they rest, from
+    points.
+    """
+    rows = dict[str, Array]()
+    for each in (each for each in outputs if not each.alone):
+        at, design = dict[str, Vec3](), dict[str, Vec3]()
+        for name in each.equation.points:
+            orders = [getattr(found.points[name], label) for label in QUANTITIES]
+            unknown = np.full(orders[0].shape, np.nan)
+            known = (unknown if values is None else values for values in orders)
+            at[name] = Vec3(*(Jet(*jet) for jet in np.moveaxis(np.stack([*known]), 2, 0)))
+            place = mechanism.point(name).position
+            design[name] = Vec3(*(Jet(np.asarray(x), np.zeros(()), np.zeros(())) for x in place))
+        with np.errstate(all="ignore"):
+            terms, speeds = each.equation.terms(at, design), each.equation.resting(at)
+        for label, order in zip(QUANTITIES[: each.derivative + 1], "xva", strict=False):
+            name = f"{OUTPUT}{label} {each.equation.name}"
+            rows[name] = np.stack([getattr(term, order) for term in terms])
+        if speeds is not None:
+            rows[f"{RESTING}{each.equation.name}"] = np.stack(speeds)
+    return rows
 
 
 def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int, str]:

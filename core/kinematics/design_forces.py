@@ -86,7 +86,7 @@ def forces_of_designs(
 def _alone(route: Route, wanted: WantedForces, geometry: Array, tol: float) -> Sequence[Forces]:
     model, path = route.model, route.path
     names = {*wanted.joints, *wanted.drivers, *wanted.elements}
-    request = replace(model.request, forces=wanted)
+    request = replace(model.request, forces=wanted, outputs=())
     each = [variant_of(model, numbers) for numbers in geometry.T]
     if len(model.frame.moving) > ONE_PROGRAM:  # as their motion, by themselves
         plain = replace(request, varied=())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,27 +14,18 @@ from ..mechanism.motions import Path
 from ..program import ITERATIONS
 from ..trajectory import QUANTITIES, Array
 from .compiled.compiled_model import Model, compile_model
-from .compiled.request import LAST_ITERATION, Request
+from .compiled.request import LAST_ITERATION, OUTPUT, RESTING, Request, WantedOutput
 from .compiled.routes import Route, Start
 from .compiled.step_programs import ALONE, JOINED
 from .continuation.walk import marcher
-from .design_batch import RECYCLED, Variants, solve_variants
+from .design_batch import RECYCLED, Variants, slopes_of, solve_variants
 from .forces.wanted import WantedForces, wanted_forces
 from .formulation.constraints import Style
-from .motion_solver import Solver, by_blocks
+from .motion_solver import Method, Solver, by_method
 from .one_design import by_motion, by_program, motion_only, prepare, start_notes
 
 if TYPE_CHECKING:
     from .design_forces import ForcesOfDesigns
-
-
-class Method(StrEnum):
-    """The system of equations solved at once; the solutions are the same to round-off."""
-
-    BY_SIZE = "by size"
-    ONE_PROGRAM = "one program"
-    BY_COMPONENTS = "component by component"
-    SPARSE = "one sparse system"
 
 
 @dataclass(frozen=True)
@@ -87,9 +77,12 @@ class NativeSolver:
             return by_program(
                 mechanism, request, path, lambda each: Route(compile_model(mechanism, each), path)
             )
-        by_components = self.method is Method.BY_COMPONENTS
-        make = by_blocks(mechanism, motion_only(mechanism, request), by_components=by_components)
-        return by_motion(mechanism, request, path, make(path))
+        if (make := by_method(self.method)) is None:
+            raise SolveError(
+                f"no extension solves {self.method.value}. Leave out the method, or install blocks."
+            )
+        motion = make(mechanism, motion_only(mechanism, request))(path)
+        return by_motion(mechanism, request, path, motion)
 
     def prepare_designs(
         self,
@@ -99,6 +92,7 @@ class NativeSolver:
         points: Sequence[str] = (),
         forces: Collection[str] = (),
         bodies: Sequence[str] = (),
+        outputs: Sequence[WantedOutput] = (),
     ) -> PreparedDesigns:
         """Return the mechanism made ready for many designs, as one program.
 
@@ -111,11 +105,13 @@ class NativeSolver:
             forces: names of joints, drivers and force elements whose forces are wanted; they take
                 order 2.
             bodies: names of the bodies whose poses are wanted.
+            outputs: wanted outputs, part of the programs.
 
         Raises:
             SolveError: as `prepare`.
         """
         request = self._request(mechanism, path, points, bodies, forces, varied)
+        request = replace(request, outputs=tuple(outputs))
         wanted = request.forces
         if wanted is not None:
             from .compiled.traced_forces import can_trace  # most studies are without
@@ -245,7 +241,7 @@ class PreparedDesigns:
 
     Attributes:
         route: the path made ready for the compiled model.
-        wanted: the forces that are wanted; None without any.
+        wanted: the wanted forces; None without any.
     """
 
     route: Route
@@ -289,15 +285,36 @@ class PreparedDesigns:
         return [found.kept[rows[f"{label} {point}"]] for label in QUANTITIES[:orders]]
 
     def pose(self, found: Variants, body: str) -> Array:
-        """Return origin [m] and Euler parameters of a body that was asked for, shape (7, n, V)."""
+        """Return origin [m] and Euler parameters of a requested body, shape (7, n, V)."""
         rows = self.route.model.rows
         return np.concatenate([found.kept[rows[f"{each} {body}"]] for each in "rp"])
+
+    def output(self, found: Variants, name: str, derivative: int = 0) -> Array:
+        """Return the terms of an output, or a time derivative of theirs, shape (terms, n, V)."""
+        return found.kept[self.route.model.rows[f"{OUTPUT}{QUANTITIES[derivative]} {name}"]]
+
+    def resting(self, found: Variants, name: str) -> tuple[Array, Array] | None:
+        """Return squares of the speeds of an output without a value at rest, shape (n, V); None for
+        any other output.
+        """
+        rows = self.route.model.rows.get(f"{RESTING}{name}")
+        return None if rows is None else (found.kept[rows][0], found.kept[rows][1])
+
+    def slopes(self, found: Variants, geometry: Array, towards: Array) -> Mapping[str, Array]:
+        """Return the derivatives of the terms of each output by motions of the geometry, drivers
+        held, shape (motions, terms, n, V); NaN at samples not reached.
+
+        Args:
+            found: result of `solve` for the geometry.
+            towards: motions of the varied numbers, shape (numbers, motions).
+        """
+        return slopes_of(self.route, found, geometry, towards)
 
     def forces(self, found: Variants, geometry: Array, tol: float) -> ForcesOfDesigns | None:
         """Return the forces of solved designs; None where none are wanted.
 
         Args:
-            found: what `solve` returns for the geometry.
+            found: the result of `solve` for the geometry.
         """
         if self.wanted is None:
             return None

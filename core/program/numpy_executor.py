@@ -25,6 +25,10 @@ def _max(a: Array, b: Array, out: Array) -> None:
     np.maximum(a, b, out=out)
 
 
+def _angle(y: Array, x: Array, out: Array) -> None:
+    np.arctan2(y, x, out=out)
+
+
 _UFUNCS: dict[str, Callable[..., Any]] = {
     "+": np.add,
     "-": np.subtract,
@@ -34,6 +38,7 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "sqrt": np.sqrt,
     "sin": np.sin,
     "cos": np.cos,
+    "atan2": _angle,
     "abs": np.absolute,
     "min": _min,
     "max": _max,

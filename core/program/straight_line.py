@@ -26,7 +26,10 @@ from ..algebra import Scalar
 from .tape import LEAVES, Node, Tape, operands, place_of
 
 FLOPS = frozenset(
-    {"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"}
+    {
+        *("+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "atan2"),
+        *("abs", "min", "max", "larger", "where"),
+    }
 )
 
 
@@ -245,7 +248,9 @@ def unroll(program: Program) -> Program:
 
 ARITY = {
     **dict.fromkeys(("copy", "node", "neg", "abs", "sqrt", "sin", "cos"), 1),
-    **dict.fromkeys(("+", "-", "*", "/", "min", "max", "umax", "larger", "before", "const"), 2),
+    **dict.fromkeys(
+        ("+", "-", "*", "/", "atan2", "min", "max", "umax", "larger", "before", "const"), 2
+    ),
     **dict.fromkeys(("fma", "fnma", "fms", "where"), 3),
 }
 """Numbers in a row of an operation beside its result. A "const" has the two halves of its value."""

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, cast
 
 import numpy as np
 
-from ..algebra import Scalar, power, root
+from ..algebra import Scalar, arc_tangent, is_array, power, root
 from ..trajectory import Array
 
 if TYPE_CHECKING:
@@ -27,9 +27,9 @@ else:  # as msgspec reads it from the cache
 """An operation and its operands: node numbers; for "input" a slot, for "const" a value; see
 `LEAVES`.
 
-"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max" act on numbers ("min" and "max"
-propagate NaN); "larger" a b is true if |a| > |b|; "where" m p q is p if m is true, else q; "before"
-x a is x of the previous lane, and a in the first lane.
+"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "atan2", "abs", "min", "max" act on numbers ("min"
+and "max" propagate NaN); "larger" a b is true if |a| > |b|; "where" m p q is p if m is true, else
+q; "before" x a is x of the previous lane, and a in the first lane.
 """
 LEAVES = frozenset({"input", "const", "node"})
 """Operations without operands. "node" s k is the value of slot s in lane k of the `NODES`, the same
@@ -87,6 +87,7 @@ class Traced:
     """
 
     __slots__ = ("number", "opposite", "tape")
+    __array_ufunc__: ClassVar[None] = None  # a number of numpy times a scalar is a scalar
 
     def __init__(self, tape: Tape, number: int, opposite: Traced | None) -> None:
         self.tape = tape
@@ -128,10 +129,23 @@ class Traced:
         """Return the square root."""
         return self.tape.node("sqrt", self.number)
 
+    def __abs__(self) -> Scalar:
+        return absolute(self)
+
+    @staticmethod
+    def arc_tangent(y: Scalar, x: Scalar) -> Scalar:
+        """Return the angle of the direction (x, y) [rad], in -pi..pi."""
+        return _operation("atan2", y, x)
+
     @staticmethod
     def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
         """Return p if |a| > |b|, else q."""
         return where_larger(a, b, p, q)
+
+
+def _unknown(a: Scalar) -> bool:
+    """Return whether it is NaN, known before any computation."""
+    return not isinstance(a, Traced) and a != a
 
 
 def _same(a: Scalar, b: Scalar) -> bool:
@@ -145,7 +159,9 @@ def _opposite(a: Scalar) -> Scalar | None:
     return -a if a < 0.0 else None
 
 
-def _operation(op: str, a: Scalar, b: Scalar) -> Traced:
+def _operation(op: str, a: Scalar, b: Scalar) -> Scalar:
+    if _unknown(a) or _unknown(b):
+        return math.nan
     tape: Tape = a.tape if isinstance(a, Traced) else b.tape
     i, j = tape.number(a), tape.number(b)
     if op in "+*" and i > j:
@@ -199,7 +215,7 @@ def _scale(op: str, a: Scalar, b: Scalar) -> Scalar:
 
 def _lanes(*scalars: Scalar) -> bool:
     """Return whether any scalar is an array of lanes."""
-    return any(isinstance(x, np.ndarray) for x in scalars)
+    return any(map(is_array, scalars))
 
 
 def _unary(op: str, a: Scalar, value: Callable[[float], float]) -> Scalar:
@@ -245,7 +261,9 @@ def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
     """Return p if |a| > |b|, else q; each lane decides by its own values."""
     if _lanes(a, b, p, q):
         return cast("Array", np.where(np.abs(a) > np.abs(b), p, q))
-    if _same(p, q) or (not isinstance(p, Traced) and not isinstance(q, Traced) and p == q):
+    if _same(p, q) or (_unknown(p) and _unknown(q)) or _unknown(a) or _unknown(b):
+        return q
+    if not isinstance(p, Traced) and not isinstance(q, Traced) and p == q:
         return p
     tape = next((x.tape for x in (a, b) if isinstance(x, Traced)), None)
     if tape is None:
@@ -301,12 +319,15 @@ def _weights(smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tu
             return (cos(a),)
         case "cos":
             return (-sin(a),)
+        case "atan2":  # of y = a over x = b
+            square = a * a + b * b
+            return b / square, -(a / square)
+        case "abs" if smooth:
+            return (y / a,)
         case "min" | "max" if smooth:
             sign = 1.0 if op == "max" else -1.0
             first = where_larger(a - b + 1.0, a - b - 1.0, 0.5 + 0.5 * sign, 0.5 - 0.5 * sign)
             return first, 1.0 - first
-        case "larger" if smooth:  # it selects coefficients, which are constants of a piece
-            return 0.0, 0.0
         case _:
             raise TypeError(
                 f"operation {op!r} has a kink and no derivative; leave it out of equations to be"
@@ -320,13 +341,12 @@ def jacobian(
     """Return the derivatives of each value by the inputs, without zeros.
 
     Args:
-        smooth: "min" and "max" are parts of smooth functions, such as the pieces of a curve, and
-            "larger" selects a piece; at the kink itself, where they need a derivative of one side,
-            it is that of the second operand.
+        smooth: "abs", "min", "max" and "where" are parts of smooth functions, such as the pieces of
+            a curve; at the kink itself the derivative is the one of the second operand.
 
     Raises:
         TypeError: a value depends on an input through an operation with a kink ("abs", "min",
-            "max", "larger", "where").
+            "max", "larger", "where"), and is not smooth.
     """
     return changes(tape, values, {each: {k: 1.0} for k, each in enumerate(inputs)}, smooth=smooth)
 
@@ -340,21 +360,47 @@ def changes(
 ) -> list[Gradient]:
     """Return the derivatives of each value by parameters, on which inputs depend with these
     derivatives; see `jacobian`.
+
+    Args:
+        inputs: operations of any kind; their operands are not looked at.
     """
     gradients = {each.number: gradient for each, gradient in inputs.items()}
-    # the tape grows as the derivatives are traced
-    for number, node in enumerate(tuple(tape.nodes)):
+    for number in _live(tape, values, gradients):
+        op, *_ = node = tape.nodes[number]
         read = operands(node)
-        if any(gradients.get(k) for k in read):
-            weights = _weights(
-                smooth, node[0], tape.scalars[number], *(tape.scalars[k] for k in read)
-            )
+        if number in gradients or not any(gradients.get(k) for k in read):
+            continue
+        if smooth and op == "where":
+            a, b = (tape.scalars[k] for k in operands(tape.nodes[read[0]]))
+            p, q = (gradients.get(k, {}) for k in read[1:])
+            gradients[number] = _chosen(a, b, p, q)
+        elif not (smooth and op == "larger"):  # which "where" reads itself
+            weights = _weights(smooth, op, tape.scalars[number], *(tape.scalars[k] for k in read))
             gradients[number] = _sum(
                 zip(weights, (gradients.get(k, {}) for k in read), strict=True)
             )
     return [
         gradients.get(value.number, {}) if isinstance(value, Traced) else {} for value in values
     ]
+
+
+def _live(tape: Tape, values: Sequence[Scalar], given: Collection[int] = ()) -> list[int]:
+    """Return the numbers of the operations needed for values, in order; none behind given ones."""
+    waiting = [each.number for each in values if isinstance(each, Traced)]
+    found = set[int]()
+    while waiting:
+        if (number := waiting.pop()) not in found:
+            found.add(number)
+            waiting += () if number in given else operands(tape.nodes[number])
+    return sorted(found)
+
+
+def _chosen(a: Scalar, b: Scalar, first: Gradient, second: Gradient) -> Gradient:
+    """Return the first gradient if |a| > |b|, else the second."""
+    return {
+        k: where_larger(a, b, first.get(k, 0.0), second.get(k, 0.0))
+        for k in (*first, *(k for k in second if k not in first))
+    }
 
 
 def _sum(terms: Iterable[tuple[Scalar, Gradient]]) -> Gradient:
@@ -371,13 +417,7 @@ def folded(tape: Tape, values: Sequence[Scalar], known: Mapping[int, Scalar]) ->
     kind in place of all: all operations fold again.
     """
     new: dict[int, Scalar] = {}
-    waiting = [each.number for each in values if isinstance(each, Traced)]
-    live = set[int]()
-    while waiting:
-        if (number := waiting.pop()) not in live:
-            live.add(number)
-            waiting += operands(tape.nodes[number])
-    for number in sorted(live):
+    for number in _live(tape, values):
         op, *rest = tape.nodes[number]
         if op == "input":
             new[number] = known.get(int(rest[0]), tape.scalars[number])
@@ -404,6 +444,7 @@ OPERATIONS: Mapping[str, Any] = {
     "sqrt": root,
     "sin": sin,
     "cos": cos,
+    "atan2": arc_tangent,
     "abs": absolute,
     "min": minimum,
     "max": maximum,

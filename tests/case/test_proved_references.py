@@ -150,6 +150,8 @@ def formula(name, unit, of):
         facts={},
         forces=(),
         of=lambda at, design: of(at["tip"]),
+        terms=lambda at, design: (of(at["tip"]),),
+        resting=lambda at: None,
     )
 
 

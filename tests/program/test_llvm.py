@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 from kincheck.core import solve, solve_designs
-from kincheck.core.algebra import root
+from kincheck.core.algebra import arc_tangent, root
 from kincheck.core.caches import clear_caches
 from kincheck.core.kinematics import Style
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
@@ -54,6 +54,7 @@ OPERATIONS = {
     "over": lambda a, b: a / b,
     "negative": lambda a, b: -a,
     "root": lambda a, b: root(a * a),
+    "angle": arc_tangent,
     "size": lambda a, b: absolute(a),
     "smaller": minimum,
     "larger": maximum,
@@ -74,7 +75,7 @@ def test_machine_code_operations_equal_numpy(name, lanes):
         executor.run("f")
     a, b = (executor.get([2])[0] for executor in both)
     np.testing.assert_array_equal(np.isnan(a), np.isnan(b))
-    np.testing.assert_allclose(b, a, rtol=2e-16, atol=0.0)
+    np.testing.assert_allclose(b, a, rtol=4e-16 if name == "angle" else 2e-16, atol=0.0)
 
 
 def test_lanes_read_nodes_of_group():
@@ -90,6 +91,18 @@ def test_lanes_read_nodes_of_group():
         np.testing.assert_allclose(
             executor.get([1])[0], np.full(lanes, 10.0 ** np.arange(NODES) @ read), rtol=1e-14
         )
+
+
+def test_arc_tangent_in_all_quadrants():
+    rng = np.random.default_rng(66)
+    angles = np.concatenate([rng.uniform(-math.pi, math.pi, 4000), np.arange(-4, 5) * math.pi / 4])
+    sizes = 10.0 ** rng.uniform(-6.0, 6.0, len(angles))
+    tiny = np.array([[1e-12, -1e-300, -1e-12, 3.0], [1.0, 2.0, -1.0, 1e-20]])
+    values = np.concatenate([sizes * np.array([np.sin(angles), np.cos(angles)]), tiny], axis=1)
+    _, compiled = executors(arc_tangent, 2, values.shape[1])
+    compiled.put([0, 1], values)
+    compiled.run("f")
+    np.testing.assert_allclose(compiled.get([2])[0], np.arctan2(*values), rtol=4e-16, atol=0.0)
 
 
 @pytest.mark.parametrize(("traced", "true"), [(sin, np.sin), (cos, np.cos)])

@@ -22,7 +22,15 @@ from numpy.typing import NDArray
 
 from ...case.case import HELD_BUT, TIME, Balance, Case, Load, Rig, Sweep, Truth
 from ...case.measures import DriverEffort, ForceMeasure
-from ...case.quantity import ORDERS, Output, Quantity, point_jets, still_jets, with_markers
+from ...case.quantity import (
+    ORDERS,
+    Output,
+    Quantity,
+    known_at,
+    point_jets,
+    still_jets,
+    with_markers,
+)
 from ...errors import KincheckError, SolveError, number_of
 from ...harness.record import Results
 from ...jet import Jet
@@ -430,7 +438,7 @@ class _Study:
         moving = {name: point_jets(PointMotion(*at(name), None)) for name in output.points}
         design = {name: still_jets(self.mechanism.point(name).position) for name in output.points}
         with np.errstate(all="ignore"):  # NaN marks unknown values
-            jet = output.of(moving, design)
+            jet = known_at(output, moving, design)
         x, v, a = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (jet.x, jet.v, jet.a))
         return Jet(x, v, a)
 

@@ -1,5 +1,5 @@
-"""Conditioning of the motion, sample by sample, and the dependence of points on residuals and on
-hardpoints.
+"""Conditioning of the motion, sample by sample, the dependence of points on residuals, and of
+redundant rows on hardpoints.
 
 With J the solved rows and phi their residuals at a pose that closes, q the unknowns and g the
 parameters of the geometry,
@@ -7,9 +7,9 @@ parameters of the geometry,
     dq = J^-1 d(residual)          shift of the pose by a solver's residuals
     dq = -J^-1 (d phi / dg) dg     shift of the pose by a moved hardpoint, drivers held
 
-so both are one factorisation and no neighbouring design is solved; d phi / dg is exact (see
-`core.dual_numbers`). A redundant row, left out of J, need not hold for the changed geometry: its
-residual is the contradiction in this geometry.
+so both are one factorisation; d phi / dg is exact (see `core.dual_numbers`). A redundant row, left
+out of J, need not hold for the changed geometry: its residual is the contradiction in this
+geometry.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import Vec3, vec
+from ...algebra import vec
 from ...dual_numbers import Slope, derivatives
 from ...kinematics.compiled.compiled_model import compile_model
 from ...kinematics.compiled.request import Request
@@ -46,15 +46,11 @@ class Gradient:
     Attributes:
         position: at the sample and at design, global [m], shape (3,).
         by_residuals: by the residuals of the solved rows [m or rad], shape (3, rows).
-        by_geometry: by the parameters of the geometry, shape (3, parameters).
-        design_by_geometry: of the position at design, shape (3, parameters).
     """
 
     position: Array
     design: Array
     by_residuals: Array
-    by_geometry: Array
-    design_by_geometry: Array
 
 
 class Geometry:
@@ -79,17 +75,16 @@ class Geometry:
 
 def _gradient(
     point: Point,
-    geometry: Geometry,
     formulation: Cartesian,
     at: Configuration,
     frame: Frames,
-    shifts: tuple[Array, Array],
+    shifts: Array,
 ) -> Gradient:
-    """Return how the position of a point depends on residuals and geometry.
+    """Return how the position of a point depends on residuals.
 
     Args:
         shifts: derivatives of the unknowns by the residuals of the solved rows [m or rad], shape
-            (unknowns, rows), and by the parameters, shape (unknowns, parameters).
+            (unknowns, rows).
     """
     pose, arm = at.poses.get(point.body, GROUND_POSE), frame.arm(point.body, point.position)
     turned, by_unknowns = pose.turn(arm), np.zeros((3, formulation.unknowns))
@@ -98,17 +93,10 @@ def _gradient(
         for k, rates in enumerate(np.eye(COLUMNS).tolist(), first):
             by_unknowns[:, k] = [*Twist(vec(rates[:3]), vec(rates[3:])).of(turned)]
     by_unknowns *= frame.unit
-    moved: Vec3 = vec(geometry.slopes.get(f"points.{point.name}.position", point.position))
-    # the body carries its point along: A times the change of where it is at design
-    design = np.array([geometry.derivatives_of(x) for x in moved])
-    along = np.array([geometry.derivatives_of(x) for x in pose.turn(moved)])
-    by_residuals, by_geometry = shifts
     return Gradient(
         np.array([*position_of(point.position, arm, frame.unit, pose)]),
         np.array(point.position),
-        by_unknowns @ by_residuals,
-        by_unknowns @ by_geometry + along,
-        design,
+        by_unknowns @ shifts,
     )
 
 
@@ -117,6 +105,7 @@ class PoseConditioning:
     """Conditioning of the pose at a sample.
 
     Attributes:
+        sample: among those of the sweep.
         value: of the swept driver or time, as the sweep has it.
         owners: joint or driver and primitive of each solved row: other rows than at design if those
             are needlessly ill-conditioned.
@@ -129,6 +118,7 @@ class PoseConditioning:
             shape (redundant rows, parameters).
     """
 
+    sample: int
     value: float
     owners: Sequence[tuple[str, str]]
     smallest: float
@@ -224,16 +214,14 @@ def conditioning(
         pose_of = formulation, configuration, frame
         looked.append(
             PoseConditioning(
+                k,
                 float(values[k]),
                 [formulation.owners[row] for row in kept],
                 float(sizes[-1]),
                 float(sizes[0]),
                 1.0,
                 screws(formulation, configuration, frame, V[-1]),
-                {
-                    name: _gradient(mechanism.point(name), geometry, *pose_of, (metres, shift))
-                    for name in points
-                },
+                {name: _gradient(mechanism.point(name), *pose_of, metres) for name in points},
                 by_geometry[dropped] + rest @ shift,
             )
         )

@@ -174,7 +174,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
             a move beyond 50 mm, which is out of reach, or if it cannot be solved.
         moves: places of the case that follow each hardpoint, direction or length, by its name.
         signs: sign conventions of the outputs; empty without.
-        not_derived: outputs of more than the pose, without budget and sensitivities.
+        not_derived: outputs of more than the pose, without budget.
         programs: lines on the native engine's programs and the parts left out.
         determinacy: of reactions and efforts, if forces are asked for; null if it cannot be solved.
     """
@@ -260,7 +260,6 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         account.rank,
         account.paper_count,
     )
-    design = {name: np.array(mechanism.point(name).position) for name in read_points(case)}
     derived = swept is not None and bool(swept.poses)
     forces = (
         determinacy(case, swept.trajectory) if swept and swept.trajectory.solved.any() else None
@@ -283,8 +282,8 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         reached=int(swept.trajectory.solved.sum()) if swept else 0,
         samples=_samples(swept) if swept else [],
         redundant_residual=swept.trajectory.details["redundant_residual"] if swept else None,
-        budgets=budgets(case, swept, tol, design) if swept and derived else [],
-        sensitivities=sensitivities(case, swept, design, variables) if swept and derived else [],
+        budgets=budgets(case, swept, tol) if swept and derived else [],
+        sensitivities=sensitivities(case, swept, geometry) if swept and derived else [],
         binding=binding_numbers(swept, variables) if swept and derived else [],
         shims={each.name: each.shim.tolist() for each in case.hardpoints if each.shim is not None},
         bump_steer=bump_steer(case) if derived else None,

@@ -9,12 +9,15 @@ import msgspec
 import numpy as np
 
 from ...algebra import Vec3, vec
-from ...case.case import ORDERS, Case, Quantity
+from ...case.case import ORDERS, Case, Quantity, without_forces
+from ...case.designs import DesignOutputs
+from ...case.quantity import still_jets
+from ...harness.compare import numbers as as_numbers
 from ...jet import Jet
 from ...joints import Kind
 from ...trajectory import Array
-from ..sweep.varied_places import Variable
-from .conditioning import Conditioning, Gradient, PoseConditioning
+from ..sweep.varied_places import Geometry, Variable
+from .conditioning import Conditioning, PoseConditioning
 
 # The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for
 # accelerations, whose rows carry rates.
@@ -55,36 +58,31 @@ class Sensitivity(msgspec.Struct, frozen=True):
         number: row and axis of a table, "lca_front x"; else the first place at a point, and the
             axis, "joints.NAME.point x"; or "joints.NAME.length".
         unit: the output's unit by m, or by rad for a direction.
-        by_sample: at the examined samples.
+        by_sample: at the examined samples; null where the output has no value.
     """
 
     output: str
     number: str
     unit: str
-    by_sample: list[float]
+    by_sample: list[float | None]
 
     @property
     def largest(self) -> float:
         """The largest over the samples, with its sign."""
-        return max(self.by_sample, key=abs)
+        return max((each for each in self.by_sample if each is not None), key=abs)
 
 
-def budgets(case: Case, found: Conditioning, tol: float, design: dict[str, Array]) -> list[Budget]:
+def budgets(case: Case, found: Conditioning, tol: float) -> list[Budget]:
     """Return the budget of every output of the pose alone."""
-    return [
-        _budget(output, found, tol, design) for output in case.outputs if output.orders == ORDERS
-    ]
+    return [_budget(output, found, tol) for output in case.outputs if output.orders == ORDERS]
 
 
-def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str, Array]) -> Budget:
-    by_rows = [np.abs(_derivative(output, pose, design, "by_residuals")[1]) for pose in found.poses]
+def _budget(output: Quantity, found: Conditioning, tol: float) -> Budget:
+    by_rows = [np.abs(_derivative(output, pose)[1]) for pose in found.poses]
     shifts = [float(rows.sum()) for rows in by_rows]
     k = int(np.argmax(shifts))
     row = int(by_rows[k].argmax())
-    size = max(
-        float(np.abs(_derivative(output, pose, design, "by_residuals")[0]).max())
-        for pose in found.poses
-    )
+    size = max(float(np.abs(_derivative(output, pose)[0]).max()) for pose in found.poses)
     shift = tol * shifts[k]
     suggested = _two_digits(MARGIN * shift)
     why = (
@@ -108,27 +106,29 @@ def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str,
     )
 
 
-def sensitivities(
-    case: Case, found: Conditioning, design: dict[str, Array], variables: Sequence[Variable]
-) -> list[Sensitivity]:
-    """Return the nonzero derivatives, the largest of each output first."""
+def sensitivities(case: Case, found: Conditioning, geometry: Geometry) -> list[Sensitivity]:
+    """Return the nonzero derivatives of outputs of motion, the largest of each output first."""
     numbers = [
         (name, "rad" if each.kind is Kind.DIRECTION else "m")
-        for each in variables
+        for each in geometry.variables
         for name in each.numbers
     ]
+    moves = geometry.moves(geometry.variables)
+    moved = [name for name in moves if np.abs(moves[name]).any()]
+    names = [each.name for each in case.outputs if not each.forces]
+    if not moved or not names:
+        return []
+    ready = DesignOutputs.of(without_forces(case), moved, slopes=names)
+    nominal = np.concatenate([geometry.values[name] for name in moved])[:, None]
+    samples = [pose.sample for pose in found.poses]
     result: list[Sensitivity] = []
-    for output in case.outputs:
-        if output.orders != ORDERS:
-            continue
-        table = np.array(
-            [_derivative(output, pose, design, "by_geometry")[1] for pose in found.poses]
-        )
+    solved = ready.solve(nominal)
+    for name, slopes in solved.slopes(np.concatenate([moves[each] for each in moved])):
         own: list[Sensitivity] = []
-        for slopes, (name, unit) in zip(table.T, numbers, strict=True):
-            if np.abs(slopes).max() > NOTHING:
-                by = f"{output.unit}/{unit}"
-                own.append(Sensitivity(output.name, name, by, slopes.tolist()))
+        for slope, (number, unit) in zip(slopes[:, samples, 0], numbers, strict=True):
+            if np.nanmax(np.abs(slope), initial=0.0) > NOTHING:
+                by = f"{ready.outputs[name].unit}/{unit}"
+                own.append(Sensitivity(name, number, by, as_numbers(slope)))
         result += sorted(own, key=lambda each: -abs(each.largest))
     return result
 
@@ -144,25 +144,14 @@ def binding_numbers(found: Conditioning, variables: Sequence[Variable]) -> list[
     return [name for name, rate in zip(names, contradicted, strict=True) if rate > NOTHING]
 
 
-def _derivative(
-    output: Quantity, pose: PoseConditioning, design: dict[str, Array], by: str
-) -> tuple[Array, Array]:
-    """Return value and derivatives of an output from the derivatives of its points."""
-    at = {
-        name: _jets(gradient.position, getattr(gradient, by))
-        for name, gradient in pose.points.items()
-    }
-    still = {name: _design(gradient, design[name], by) for name, gradient in pose.points.items()}
+def _derivative(output: Quantity, pose: PoseConditioning) -> tuple[Array, Array]:
+    """Return value and derivatives of an output by residuals, from those of its points; residuals
+    do not shift its points at design.
+    """
+    at = {name: _jets(each.position, each.by_residuals) for name, each in pose.points.items()}
+    still = {name: still_jets(each.design) for name, each in pose.points.items()}
     jet = output.of(at, still)
     return jet.x, np.broadcast_to(jet.v, next(iter(at.values())).x.v.shape)
-
-
-def _design(gradient: Gradient, position: Array, by: str) -> Vec3:
-    """Return a point at design: hardpoints shift it, residuals do not."""
-    moved = (
-        gradient.design_by_geometry if by == "by_geometry" else np.zeros_like(gradient.by_residuals)
-    )
-    return _jets(position, moved)
 
 
 def _jets(position: Array, derivatives: Array) -> Vec3:

@@ -59,7 +59,7 @@ def _parts(found: Diagnosis, verbose: bool) -> Iterator[Text | Table]:
         yield from _forces(found.determinacy)
     if found.not_derived and found.samples:
         yield Text(
-            "not functions of the pose alone, so without tolerance and sensitivities here:"
+            "not functions of the pose alone, so without tolerance here:"
             f" {join_names(found.not_derived)}"
         )
     if found.programs:

@@ -8,30 +8,30 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ...case.io.atomic_files import require_writable
+from ...case.io.atomic_files import written as written_file
 from ...case.io.escape import file_name
-from ...cli.registry import Registry, Status
+from ...cli.registry import Registry, Status, names_of_given
 from ...cli.shared_options import OfCase, driver_value
-from ...doors import offers
-from ...errors import KincheckError, refuse, unknown
+from ...doors import Offer, offers
+from ...errors import MOST_NAMED, KincheckError, refuse, shortened, unknown
 from ...options import (
     destination,
     number_with_unit,
     option,
     options,
 )
-
-if TYPE_CHECKING:
-    pass
-
+from ...report.progress import complain
 
 if TYPE_CHECKING:
     from .model_writer import Writer
 
 
 def formats() -> str:
-    """Return the formats as text for the help."""
-    *first, last = (f"{name} ({each.where})" for name, each in offers("formats").items())
-    return f"{', '.join(first)} or {last}"
+    """Return the formats and languages as text for the help."""
+    found = [f"{name} ({each.where})" for name, each in offers("formats").items()]
+    found += offers("codes")
+    return " or ".join(filter(None, [", ".join(found[:-1]), *found[-1:]])) or "none is installed"
 
 
 def writer_of(name: str) -> Writer:
@@ -48,16 +48,24 @@ def writer_of(name: str) -> Writer:
 
 @options
 class Export(OfCase):
-    """Write a case's mechanism in a simulator's format, with a consistent start.
+    """Write a case's mechanism in a simulator's format, with a consistent start; or the solved case
+    as code: C, JavaScript, or an FMU.
 
-    A second file holds the parts that the format lacks, such as the loop constraints of a URDF.
+    A second file holds the parts that a format lacks, such as the loop constraints of a URDF.
     """
 
-    about = "write a mechanism for a simulator"
+    about = "write a mechanism for a simulator, or a solved case as code"
     to: str = destination(formats(), metavar="FORMAT", required=True)
     out: Path | None = destination(
-        "stem of the written files; default: the case's name, in this folder", Path
+        "stem of the written files, of code their folder; default: the case's name, in this folder",
+        Path,
     )
+    vary: tuple[str, ...] = option(
+        "a number that the code takes as a parameter, such as 'tierod_inner z'",
+        metavar="PLACE",
+        several="together",
+    )
+    fmi: str | None = option("version of the FMU; default 2", metavar="VERSION", choices=("2", "3"))
     at: str | None = option(
         "value of the swept driver at the start, such as 30mm or -20deg, in SI without a unit;"
         " default: the design position",
@@ -70,11 +78,37 @@ class Export(OfCase):
         from ...report.progress import complain
         from .model_writer import written
 
+        if (code := offers("codes").get(self.to)) is not None:
+            return self._write_code(code, registry)
+        if found := names_of_given(self, ("vary", "fmi")):
+            raise KincheckError(f"{found}: only code takes it. Leave it out, or add --to c.")
         writer = writer_of(self.to)
         case = registry.case_of(self, driven=False)
         texts = written(case, writer, driver_value(self.at, case))
         keep_texts(texts, case.name, self.out)
         complain(f"note: left out: {each}" for each in _left_out(texts))
+        return Status.WITHIN
+
+    def _write_code(self, code: Offer, registry: Registry) -> int:
+        if self.at is not None:
+            raise KincheckError("--at: the code starts at the design position. Leave it out.")
+        if self.fmi is not None and self.to != "fmu":
+            raise KincheckError("--fmi: only an FMU has a version. Add --to fmu, or leave it out.")
+        case = registry.case_of(self)
+        version = {"fmi": int(self.fmi)} if self.fmi else {}
+        contents = code.load()(case, self.vary, **version)
+        folder = self.out or Path()
+        folder.mkdir(parents=True, exist_ok=True)
+        files = {folder / name: content for name, content in contents.items()}
+        require_writable([("--out", file) for file in files])
+        problems: list[str] = []
+        for file, content in files.items():
+            problems += written_file(file, content)
+            print(file)
+        refuse(problems)
+        left = [each.name for each in case.outputs if each.forces]
+        if left:
+            complain([f"{case.name}: the code has no forces: {shortened(left, MOST_NAMED)}"])
         return Status.WITHIN
 
 
@@ -96,9 +130,6 @@ def keep_texts(
         KincheckError: a file cannot be written, would overwrite the JSON, or exists and
             `out` is None.
     """
-    from ...case.io.atomic_files import require_writable
-    from ...case.io.atomic_files import written as written_file
-
     first = next(iter(texts))
     main: Path = out or Path(file_name(name) + first)
     files = {

@@ -234,8 +234,7 @@ function remembered(key, text) {
   function settled() {
     if (link.isDue("solve")) return;
     parts.figures.draw(true);
-    const late = opening.outputs.some(({ name }) => !state.fresh.has(name));
-    if ((late || !state.answer.solved.every(Boolean)) && !parts.whole) {
+    if (!state.answer.solved.every(Boolean) && !parts.whole) {
       parts.whole = true;
       return ask(true);
     }

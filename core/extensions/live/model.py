@@ -10,6 +10,7 @@ from time import perf_counter
 import numpy as np
 
 from ...case.case import HELD_BUT, SLOW, Case, size
+from ...case.designs import TOL
 from ...errors import KincheckError, SolveError, unknown
 from ...harness.compare import output_series
 from ...kinematics import NativeSolver
@@ -19,7 +20,7 @@ from ...trajectory import Array
 from ..explain.conditioning import conditioning
 from ..explain.diagnose import diagnose
 from .protocol import Answer, LiveDriver, Move, Opening, Pose, Reach, Reached, Solve
-from .table import TOL, LiveFile, drawn, drawn_frames, sweep_axis
+from .table import LiveFile, drawn, drawn_frames, sweep_axis
 
 WAY = 33
 """Samples on the way from the design to a pose; longer steps are divided by the solver."""

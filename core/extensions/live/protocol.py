@@ -46,8 +46,7 @@ class Solve(_Message, frozen=True):
     """Solve a table with these points.
 
     Attributes:
-        whole: whether outputs that need another solution are wanted, and samples beyond a step
-            that has to be divided: both take longer.
+        whole: whether samples beyond a step that has to be divided are wanted, which takes longer.
     """
 
     points: Rows

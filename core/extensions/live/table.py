@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from time import perf_counter
 from types import MappingProxyType
@@ -14,31 +14,27 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import Vec3
-from ...case.case import HELD_BUT, PER_TRAVEL, Case, size, without_forces
-from ...case.closing import held_case, moves_alone
-from ...case.io.reader_options import Supplied
-from ...case.models.files import read_hardpoints
-from ...case.quantity import Output, Quantity, still_jets
-from ...case.turns import count_output_turns
+from ...case.case import PER_TRAVEL, Case, without_forces
+from ...case.designs import DesignOutputs
+from ...case.quantity import Output, Quantity
 from ...errors import KincheckError, unknown
 from ...harness.labels import output_label
 from ...harness.provenance import case_facts
 from ...harness.scene import scene
-from ...harness.trajectory_check import SAME_POSE
-from ...jet import Jet
-from ...kinematics import NativeSolver, PreparedDesigns, Variants, places, require_driven
-from ...mechanism.motions import Path as Way
-from ...program.llvm.compiler import available
+from ...kinematics import places, require_driven
+from ...program.llvm.machine_code import available
 from ...report.axis import DISPLAY, Axis, driver_axis
 from ...report.drawing import drawing
 from ...trajectory import Array
 from ...unit_text import unit_text
+from ..hardpoints.options import WheelOptions
 from ..hardpoints.read import case_of_hardpoints
+from ..hardpoints.reader import read_hardpoints
 from ..hardpoints.saving import free_name, save_table
 from ..hardpoints.table import Hardpoint, axes_of, number, unit_of
 from ..sweep.conformance import histogram
 from ..sweep.variation_file import read_variation
+from ..sweep.varied_places import Geometry
 from .protocol import (
     Answer,
     Bins,
@@ -60,17 +56,10 @@ from .protocol import (
     Vary,
 )
 
-TOL = 1e-12
-"""Largest accepted residual, relative to the mechanism's size, as in `kincheck run`."""
 FRAMES = 41
 """Most drawn samples: as many as a hand can tell apart on the slider."""
 VARIANTS = 512
 """Variants of a histogram: its bins hold some tens of them."""
-PARTS = 16
-"""Parts of a step on a path with velocities by some drivers alone: of eight, some fail."""
-MOVED = 2e-5
-"""Half of the difference for derivatives [m]: its square times a third derivative is far below the
-three digits shown, and rounding of 1e-15 m over it too."""
 
 
 class LiveFile:
@@ -118,7 +107,7 @@ class LiveTable(LiveFile):
     def __init__(
         self,
         file: Path,
-        supplied: Supplied,
+        supplied: WheelOptions,
         referenced: Callable[[Case], Case] = lambda case: case,
         vary: Path | None = None,
     ) -> None:
@@ -130,7 +119,7 @@ class LiveTable(LiveFile):
         require_driven(self.case.mechanism)
         self.axis = sweep_axis(self.case)
         self.variation = read_variation(vary, self.case) if vary else None
-        self._structure, self._designs = self._prepare(self.case)
+        self._ready = self._prepare(self.case)
 
     @property
     def positions(self) -> Rows:
@@ -173,8 +162,8 @@ class LiveTable(LiveFile):
         return replace(case, sweep=replace(case.sweep, values=self.case.sweep.values))
 
     def solve(self, asked: Solve) -> Answer:
-        """Return the motion of an edited table; if it is not to be whole, without the outputs that
-        need another solution, and only up to a step that fails.
+        """Return the motion of an edited table; if it is not to be whole, only up to a step that
+        fails.
 
         Raises:
             KincheckError: the reader refuses the points.
@@ -182,21 +171,17 @@ class LiveTable(LiveFile):
         times = [perf_counter()]
         case = self.edited_case(asked.points)
         times.append(perf_counter())
-        designs, geometry = self._current_designs(case), _geometry(case)
-        found = designs.solve(geometry, TOL, alone=asked.whole)
+        found = self._current(case).solve(_geometry(case), alone=asked.whole)
         times.append(perf_counter())
-        outputs = [each for each in case.outputs if asked.whole or _alone(each) not in self._held]
         values = {
-            name: each[:, 0].tolist()
-            for name, each in self._outputs(case, designs, found, geometry, outputs).items()
+            each.name: found.values(each.name)[:, 0].tolist()
+            for each in case.outputs
+            if not each.forces
         }
         times.append(perf_counter())
         solved = found.solved[:, 0]
         frames = drawn_frames(solved, key_samples(case, found.solved))
-        poses = {
-            body.name: designs.pose(found, body.name)[:, frames, 0].T
-            for body in case.mechanism.moving
-        }
+        poses = {body.name: found.pose(body.name)[:, frames, 0].T for body in case.mechanism.moving}
         picture = drawn(case, self.axis, frames, poses, {})
         times.append(perf_counter())
         steps = zip(("read", "solve", "outputs", "drawing"), np.diff(times).tolist(), strict=True)
@@ -205,7 +190,7 @@ class LiveTable(LiveFile):
             solved=solved.tolist(),
             drawing=picture,
             frames=frames,
-            message=found.messages.get(0, ""),
+            message=found.found.messages.get(0, ""),
             milliseconds={name: 1e3 * each for name, each in steps},
         )
 
@@ -220,21 +205,25 @@ class LiveTable(LiveFile):
         return Invalid(message=f"found {asked.text!r}, expected {value!r} without signs between")
 
     def rank(self, asked: Rank) -> Ranking:
-        """Return the derivatives of an output by each number of the table, by differences.
+        """Return the derivatives of an output by each number of the table.
 
         Raises:
             KincheckError: the reader refuses the points, or there is no such output.
         """
         case = self.edited_case(asked.points)
-        names = [each.name for each in case.hardpoints]
-        steps = np.kron(np.eye(3 * len(names)), [[MOVED], [-MOVED]])
-        offsets = dict(zip(names, np.split(steps, len(names), axis=1), strict=True))
-        moved = {
-            name: each.reshape(len(steps), -1).T for name, each in case.geometry(offsets).items()
-        }
-        found, values = self._of_variants(case, asked.output, _geometry(case, moved))
+        names, geometry = [each.name for each in case.hardpoints], Geometry(case)
+        moves, count = geometry.moves(geometry.variables), 3 * len(names)
+        towards = np.concatenate(
+            [
+                moves.get(place, np.zeros((len(value), count)))
+                for place, value in places(case.mechanism).items()
+            ]
+        )
+        ready = self._ready_for(case, asked.output)
+        found = ready.solve(_geometry(case), alone=False)
+        ((_, by_number),) = found.slopes(towards)
         samples = key_samples(self.case, found.solved)
-        slopes = ((values[:, ::2] - values[:, 1::2]) / (2 * MOVED))[samples]
+        slopes = by_number[:, samples, 0].T
         order: list[int] = np.argsort(
             -np.nan_to_num(np.abs(slopes)).max(axis=0), kind="stable"
         ).tolist()
@@ -255,8 +244,9 @@ class LiveTable(LiveFile):
         count = min(variation.count or VARIANTS, VARIANTS)
         varied = variation.geometry(variation.offsets(0, 0, count))
         geometry = _geometry(case, _by_place(variation.places, varied))
-        found, values = self._of_variants(case, asked.output, geometry)
-        samples = key_samples(case, found.solved)
+        self._require_motion(case, asked.output)
+        found = self._current(case).solve(geometry, alone=False)
+        values, samples = found.values(asked.output), key_samples(case, found.solved)
         bins = [histogram([values], sample) for sample in samples]
         return Spread(
             output=asked.output,
@@ -275,91 +265,46 @@ class LiveTable(LiveFile):
         self.edited_case(asked.points)
         return Saved(name=save_table(self.table, self.supplied, asked.points, asked.name).name)
 
-    def _prepare(self, case: Case) -> tuple[list[str], PreparedDesigns]:
-        """Return the key of a program, and the program, compiled."""
-        path = case.sweep.path
-        bodies = [body.name for body in case.mechanism.moving]
-
-        def prepare(path: Way) -> PreparedDesigns:
-            wanted = [*places(case.mechanism)], without_forces(case).points
-            designs = NativeSolver().prepare_designs(case.mechanism, path, *wanted, bodies=bodies)
-            designs.solve(_geometry(case), TOL)
-            return designs
-
+    def _prepare(self, case: Case) -> DesignOutputs:
+        """Return the program of a case, compiled."""
         at_once: AbstractContextManager[None] = nullcontext()
         if available():
             from ...program.llvm.jit import compiled_at_once
 
             at_once = compiled_at_once()
         with at_once:  # otherwise an edit in between waits for the compiler
-            designs = prepare(path)
-            self._held = {
-                alone: prepare(_in_parts(held_case(case, alone).sweep.path))
-                for alone in dict.fromkeys(map(_alone, case.outputs))
-                if alone and not moves_alone(path, alone)
-            }
-        return _structure(case), designs
+            bodies = [body.name for body in case.mechanism.moving]
+            ready = DesignOutputs.of(without_forces(case), places(case.mechanism), bodies=bodies)
+            ready.solve(_geometry(case))
+        self._structure, self._differentiated = _structure(case), dict[str, DesignOutputs]()
+        return ready
 
-    def _current_designs(self, case: Case) -> PreparedDesigns:
+    def _current(self, case: Case) -> DesignOutputs:
         """Return the program of a case: the same for all numbers, unless they change the joints."""
         if self._structure != _structure(case):
-            self._structure, self._designs = self._prepare(case)
-        return self._designs
+            self._ready = self._prepare(case)
+        return self._ready
 
-    def _of_variants(self, case: Case, name: str, geometry: Array) -> tuple[Variants, Array]:
-        """Return V variants, and the values of an output over their samples, shape (n, V).
+    def _ready_for(self, case: Case, name: str) -> DesignOutputs:
+        """Return the program of an output with its slopes.
 
         Raises:
             KincheckError: there is no such output of motion.
         """
+        output = self._require_motion(case, name)
+        self._current(case)
+        if name not in self._differentiated:
+            alone = replace(case, outputs=(output,))
+            self._differentiated[name] = DesignOutputs.of(
+                alone, places(case.mechanism), slopes=(name,)
+            )
+        return self._differentiated[name]
+
+    def _require_motion(self, case: Case, name: str) -> Quantity:
         known = {each.name: each for each in case.outputs if not each.forces}
         if name not in known:
             raise KincheckError(unknown("output", name, known))
-        designs = self._current_designs(case)
-        found = designs.solve(geometry, TOL, alone=False)
-        return found, self._outputs(case, designs, found, geometry, [known[name]])[name]
-
-    def _outputs(
-        self,
-        case: Case,
-        designs: PreparedDesigns,
-        found: Variants,
-        geometry: Array,
-        outputs: Sequence[Quantity],
-    ) -> dict[str, Array]:
-        """Return outputs over the samples of V variants, shape (n, V)."""
-        names, values = without_forces(case).points, dict[str, Array]()
-        sizes = {place: len(value) for place, value in places(case.mechanism).items()}
-        standing = _by_place(sizes, geometry)
-        design = {
-            name: still_jets(standing[place])
-            for name in names
-            if (place := f"points.{name}.position") in standing
-        }
-        computed = [(each, _alone(each)) for each in outputs if not each.forces]
-        with np.errstate(all="ignore"):
-            for alone in dict.fromkeys(by for _, by in computed):
-                # the same poses, with velocities by some drivers while the others rest
-                held, known = found, found.solved
-                if alone in self._held:
-                    fine = self._held[alone].solve(geometry, TOL)
-                    held = replace(fine, kept=fine.kept[:, ::PARTS], solved=fine.solved[::PARTS])
-                    off = [
-                        np.abs(designs.motion(found, name)[0] - designs.motion(held, name)[0])
-                        for name in names
-                    ]
-                    # at one place: not in another assembly
-                    known = held.solved & (np.max(off, axis=(0, 1)) <= SAME_POSE * size(case))
-                at = {
-                    name: Vec3(*(Jet(*each) for each in zip(*motion, strict=True)))
-                    for name in names
-                    for motion in [designs.motion(held, name)]
-                }
-                for each in (each for each, by in computed if by == alone):
-                    moved = {name: at[name] for name in each.points}
-                    jet = count_output_turns(case.mechanism, case.sweep.path, each, moved, design)
-                    values[each.name] = np.where(known, jet.x, np.nan)
-        return values
+        return known[name]
 
 
 def drawn_frames(solved: NDArray[np.bool_], always: Sequence[int] = ()) -> list[int]:
@@ -439,20 +384,6 @@ def _live_reference(case: Case) -> dict[str, LiveReference]:
     return found
 
 
-def _alone(output: Quantity) -> tuple[str, ...]:
-    """Return the drivers by which an output is differentiated while the others rest."""
-    return tuple(output.facts.get(HELD_BUT, ()))
-
-
-def _in_parts(path: Way) -> Way:
-    """Return a path with its steps in equal parts, which are followed whole: the velocities at its
-    samples do not point to the next ones.
-    """
-    samples = np.arange(len(path.times))
-    parts = np.arange(PARTS * (len(samples) - 1) + 1) / PARTS
-    return replace(path, times=np.interp(parts, samples, path.times))
-
-
 def _by_place(sizes: Mapping[str, int], geometry: Array) -> dict[str, Array]:
     """Return the rows of the geometry by place."""
     return dict(zip(sizes, np.split(geometry, np.cumsum([*sizes.values()])[:-1]), strict=True))
@@ -473,8 +404,24 @@ def _geometry(case: Case, moved: Mapping[str, Array] = MappingProxyType({})) -> 
     )
 
 
-def _structure(case: Case) -> list[str]:
-    """Return the key of a program: all but the numbers."""
+def _structure(case: Case) -> list[Any]:
+    """Return the key of a program: all but the numbers of places, and tolerances."""
     joints = [f"{each.name} {each.type} {each.bodies}" for each in case.mechanism.joints]
     points = [f"{each.name} {each.body}" for each in case.mechanism.points]
-    return [*joints, *points, *places(case.mechanism), *(each.name for each in case.outputs)]
+    return [*joints, *points, *places(case.mechanism), *map(_equation, case.outputs)]
+
+
+def _equation(output: Any) -> Any:
+    """Return an output without what an edit changes beside places: its tolerance, and a radius that
+    is that of a point.
+    """
+    kept = dict[str, Any]()
+    for each in fields(output):
+        value = getattr(output, each.name)
+        if each.name in ("atol", "rtol", "why"):
+            kept[each.name] = type(value)()
+        elif each.name == "of_output":
+            kept[each.name] = _equation(value)
+        elif getattr(value, "wheel_contact", None) is not None:
+            kept[each.name] = replace(value, wheel_radius=None)
+    return replace(output, **kept)

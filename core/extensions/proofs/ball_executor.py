@@ -66,6 +66,10 @@ def _maximum(a: Ball, b: Ball) -> Ball:
     return a.max(b)
 
 
+def _angle(y: Ball, x: Ball) -> Ball:
+    return flint().arb.atan2(y, x)
+
+
 def _where(m: bool, p: Ball, q: Ball) -> Ball:
     return p if m else q
 
@@ -74,6 +78,7 @@ _OPERATIONS: Mapping[str, Callable[..., Any]] = {
     **OPERATIONS,
     "sin": operator.methodcaller("sin"),
     "cos": operator.methodcaller("cos"),
+    "atan2": _angle,
     "min": _minimum,
     "max": _maximum,
     "larger": _larger,

@@ -20,7 +20,9 @@ from ...algebra import Vec3
 from ...case.case import HELD_BUT, Case, Quantity
 from ...case.io.reference_file import ProvedSeries, Reference, Sample
 from ...case.measures import Orientation
-from ...case.turns import orient_from_design, turns_of
+from ...case.pose_measures import with_signs
+from ...case.quantity import known_at
+from ...case.turns import signs_of, turns_of
 from ...forces import DETERMINED, Forces, Reaction
 from ...harness.compare import output_series
 from ...jet import Jet
@@ -357,10 +359,10 @@ def _output_jet(
 ) -> Jet:
     """Return an output, an angle or an orientation with its turns along the path."""
     if isinstance(output, Orientation):
-        return orient_from_design(
-            case.mechanism, case.sweep.path, output, at, design, np.array(proved)
-        )
-    jet = output.of(at, design)
+        terms, path = output.terms(at, design), case.sweep.path
+        sign = signs_of(case.mechanism, path, output, terms, np.array(proved))
+        return output.component_of(with_signs(sign, terms))
+    jet = known_at(output, at, design)
     if not output.period:
         return jet
     x, v = (np.asarray(each).astype(np.float64) for each in (jet.x, jet.v))

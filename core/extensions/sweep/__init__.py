@@ -6,7 +6,12 @@ EXTENSION = Extension(
     __name__,
     needs=["cluster"],
     commands={"sweep": "command:Sweep"},
-    public={"sweep": "command:Sweep"},
+    public={
+        "DesignCurves": "curves:DesignCurves",
+        "curves": "curves:curves",
+        "curves_by_chunk": "curves:curves_by_chunk",
+        "sweep": "command:Sweep",
+    },
     schemas={"variation": "variation_schema:variation_schema"},
     keys={"variation": "variation_schema:__doc__"},
 )

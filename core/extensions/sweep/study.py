@@ -15,15 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import Vec3
-from ...case.case import Case, Quantity, size, without_forces
-from ...case.closing import require_no_held
-from ...case.measures import ForceMeasure
-from ...case.quantity import still_jets
-from ...case.turns import count_output_turns
+from ...case.case import Case, Quantity, size
+from ...case.designs import DesignOutputs
 from ...errors import KincheckError
-from ...jet import Jet
-from ...kinematics import ForcesOfDesigns, NativeSolver, PreparedDesigns, Variants, placed
+from ...kinematics import placed
 from ...mechanism.motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from .statistics import Summary, empty_summary, merge, summary_of
@@ -81,9 +76,6 @@ def limit_counts(
     return found
 
 
-# Variants solved together: enough to make the cost of the calls for their reduction negligible.
-# `solve_designs` reduces nothing, and is as fast with a quarter of them.
-TOGETHER = 1024
 # Number of chunks for threads and workers to share, and the least and largest number of variants in
 # a chunk. A chunk has a price: the other threads wait for Python's lock, and the scheduler of a
 # cluster spends a millisecond.
@@ -192,9 +184,6 @@ class Study:
     picked: frozenset[int] = frozenset()
     whole: bool = False
 
-    def __post_init__(self) -> None:
-        require_no_held(self.case)
-
     @property
     def of_a_chunk(self) -> int:
         """Variants in a chunk. It depends on the study alone, so sums have the same round-off."""
@@ -257,33 +246,22 @@ class Ready:
     """A study with a compiled model: it solves chunks, in any order and in several threads."""
 
     study: Study
-    designs: PreparedDesigns
-    path: Path
+    outputs: DesignOutputs
 
     @staticmethod
     def of(study: Study) -> Ready:
         """Return the study with a compiled model; the model solves only needed derivatives."""
-        case = study.case
-        # an output with one derivative less is a quotient of velocities; with two less it
-        # contains derivatives of velocities
-        order = max(
-            3 - output.orders + min(study.order, output.orders - 1) for output in case.outputs
-        )
-        varied = tuple(study.variation.places)
-        solver = NativeSolver(order=order)
-        designs = solver.prepare_designs(
-            case.mechanism, case.sweep.path, varied, without_forces(case).points, case.forces
-        )
-        return Ready(study, designs, case.sweep.path)
+        places = study.variation.places
+        return Ready(study, DesignOutputs.of(study.case, places, derivative=study.order))
 
     def on_path(self, path: Path) -> Ready:
         """Return the same model on another path of the same drivers."""
-        return Ready(self.study, self.designs.on_path(path), path)
+        return Ready(self.study, self.outputs.on_path(path))
 
     @property
     def lanes(self) -> int:
         """The number of variants solved at once."""
-        return self.designs.at_once(TOGETHER)
+        return self.outputs.at_once
 
     @cached_property
     def nominal(self) -> Array:
@@ -297,44 +275,11 @@ class Ready:
             The values of the rows, shape (rows, n, V), NaN if missing; whether each sample is
             solved, shape (n, V); the number of retried variants; messages by variant.
         """
-        geometry = self.study.variation.geometry(offsets)
-        found = self.designs.solve(geometry, self.study.tol)
-        forces = self.designs.forces(found, geometry, self.study.tol)
-        rows = self._rows(found, geometry, forces)
-        return rows, found.solved, found.retried, found.messages
-
-    def _rows(self, found: Variants, geometry: Array, forces: ForcesOfDesigns | None) -> Array:
-        at: dict[str, Vec3] = {}
-        design: dict[str, Vec3] = {}
-        numbers = self.study.variation.slices
-        unknown = np.full((1, 1), np.nan)
-        for name in without_forces(self.study.case).points:
-            known = self.designs.motion(found, name)
-            x, v, a = (known[k] if k < len(known) else (unknown,) * 3 for k in range(3))
-            at[name] = Vec3(*(Jet(*each) for each in zip(x, v, a, strict=True)))
-            place = f"points.{name}.position"
-            where = (
-                geometry[numbers[place]]
-                if place in numbers
-                else np.array(self.study.case.mechanism.point(name).position)
-            )
-            design[name] = still_jets(where)
-        values = np.empty((len(self.study.rows), *found.solved.shape))
-        # unknown numbers are NaN, and every result of them is NaN
-        with np.errstate(all="ignore"):
-            case, path = self.study.case, self.path
-            moved = without_forces(case).outputs
-            jets = {o.name: count_output_turns(case.mechanism, path, o, at, design) for o in moved}
-            for k, row in enumerate(self.study.rows):
-                if isinstance(row.output, ForceMeasure):
-                    assert forces is not None  # the case asks for them
-                    values[k] = forces.read(row.output.values)
-                    continue
-                jet = jets[row.output.name]
-                values[k] = (jet.x, jet.v, jet.a)[row.derivative]
-        if not np.isfinite(values.sum()):
-            values[~np.isfinite(values)] = np.nan
-        return values
+        solved = self.outputs.solve(self.study.variation.geometry(offsets), self.study.tol)
+        rows = np.empty((len(self.study.rows), *solved.solved.shape))
+        for k, row in enumerate(self.study.rows):
+            rows[k] = solved.values(row.output.name, row.derivative)
+        return rows, solved.solved, solved.found.retried, solved.found.messages
 
     def chunk(self, index: int) -> Chunk:
         """Solve a chunk."""
@@ -435,7 +380,7 @@ def gradients(ready: Ready) -> Gradients:
     """Return the gradients of a study."""
     study, path = ready.study, ready.study.case.sweep.path
     n, count = len(path.times), len(study.variation.coordinates)
-    start = ready.designs.start
+    start = ready.outputs.designs.start
     from_design = start.starts_at_design
     if from_design:  # one sample more, at the design position
         ready = ready.on_path(Path(path.motions, np.append(path.times, start.time), path.design))

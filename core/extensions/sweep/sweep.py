@@ -258,7 +258,7 @@ def sweep_designs(
     with ThreadPoolExecutor(jobs) as pool:  # sorting runs without Python's lock
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
-    run["cases"][case.name]["notes"] += ready.designs.start_notes(tol)
+    run["cases"][case.name]["notes"] += ready.outputs.designs.start_notes(tol)
     measured = _speed_figures(
         study, found.count - earlier, jobs if source is None else None, seconds, processor
     )

@@ -28,9 +28,9 @@ from ...mechanism.motions import Path
 from ...program import ITERATIONS, NODES, Plan, groups_behind
 from ...program.disk_cache import load_or_make
 from ...program.llvm import compiler
-from ...program.llvm.compiler import available
 from ...program.llvm.executor import Executor, bind
-from ...program.llvm.jit import LlvmCode, make_loops_ready
+from ...program.llvm.jit import LlvmCode
+from ...program.llvm.machine_code import available
 from ...trajectory import Array
 from ..formulation.constraints import Frames
 from ..formulation.state_vectors import samples
@@ -43,12 +43,14 @@ from .request import (
     LARGEST,
     LARGEST_OF_PARTS,
     MAX_ITERATIONS,
+    RESTING,
     SMALLEST,
     SMALLEST_OF_PARTS,
     TIME,
     Request,
     kept_forces,
     kept_motions,
+    kept_outputs,
     kept_tests,
     row_ranges,
     rows_of_bodies,
@@ -97,7 +99,7 @@ def load_or_trace(mechanism: Mechanism, request: Request, alike: Alike | None = 
     Raises:
         SolveError: drivers and degrees of freedom do not match.
     """
-    compiled = request.compiled and compiler.available()
+    compiled = request.compiled and available()
     lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
     if alike or request.varied or not (is_builtin(mechanism) and compiled):
         return _trace(mechanism, request, alike, lanes)
@@ -145,6 +147,7 @@ def source_files() -> list[str]:
 
 def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: int) -> Tracing:
     from .programs import Tracer  # with all that tracing takes: who finds it done does without
+    from .traced_outputs import TracedOutputs
 
     tracer = Tracer(mechanism, request, alike)
     programs = [tracer.newton(), step_programs.predict(tracer)]
@@ -153,7 +156,10 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
         programs.append(tracer.tangent())
     if not request.state:
         programs.append(step_programs.extrapolate(tracer, lanes))
-    programs.append(tracer.outputs())
+    outputs = TracedOutputs(tracer)
+    programs.append(tracer.outputs(outputs.store))
+    if request.slopes:
+        programs.append(outputs.slopes())
     programs += step_programs.tests(tracer, neighbours=False)
     if not request.state:  # parts of a mechanism are attempted lane by lane
         programs += step_programs.tests(tracer, neighbours=True)
@@ -165,7 +171,8 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
     tracer.layout.scalar(ITERATIONS)
     slots, vectors, state = tracer.layout.slots, tracer.layout.vectors, tracer.formulation.design
     sampled = [slots[TIME], *slots_of(vectors, (f"drive {name}" for name in request.drivers))]
-    motions = [*kept_motions(request, state), *(kept_forces(vectors) if request.forces else ())]
+    motions = [*kept_motions(request, state), *kept_outputs(vectors)]
+    motions += kept_forces(vectors) if request.forces else ()
     tests = kept_tests(request, tracer.blocks)
     fixed = [*(target for _, target in carried), *slots_of(vectors, tracer.geometry)]
     plan = Plan(
@@ -189,6 +196,8 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
         tolerance=request.last_iteration,
         most=MAX_ITERATIONS,
     )
+    rows = row_ranges({name: len(vectors[name]) for name in motions}, tests)
+    rows |= {RESTING + name: rows[of] for name, of in outputs.resting.items()}
     return Tracing(
         plan,
         vectors,
@@ -196,7 +205,7 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
         tracer.geometry,
         tracer.at_rest,
         sampled,
-        row_ranges({name: len(vectors[name]) for name in motions}, tests),
+        rows,
         tracer.blocks,
         tracer.selection,
         tracer.frame,
@@ -223,8 +232,6 @@ def compile_model(mechanism: Mechanism, request: Request, alike: Alike | None = 
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
             the design position.
     """
-    if request.compiled and available():
-        make_loops_ready()
     return Model(mechanism, request, load_or_trace(mechanism, request, alike))
 
 
@@ -387,7 +394,8 @@ class Model(Tracing):
     def _solve_design(self) -> Array:
         geometry = np.array([number for value in self.varied.values() for number in value])
         found = self.design_lanes(geometry[:, None])[:, 0]
-        if np.isnan(found).any():
+        # outputs that are quotients by a speed have no value there
+        if np.isnan(found[self.slots["closure"]]):
             closure = float(self.executor(1).get([self.slots["closure"]])[0, 0])
             raise SolveError(
                 f"mechanism {self.mechanism.name!r} does not close at the design position: residual"

@@ -14,9 +14,9 @@ iteration.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, reduce
-from typing import Any
+from typing import Any, TypeAlias
 
 from ...algebra import Scalar, quat, vec
 from ...mechanism.mechanism import Mechanism
@@ -52,6 +52,15 @@ from .request import (
     by_block,
 )
 from .traced_forces import Rows, TracedForces, angles, native_rows
+
+Moving: TypeAlias = Callable[[str], tuple[Pose, Twist, Acceleration]]
+"""Pose, twist and acceleration of a body by its name."""
+Further: TypeAlias = Callable[[dict[int, Scalar], Sequence[Scalar], Sequence[Scalar]], None]
+"""Adds to the outputs of a program, from rates of the unknowns and their accelerations."""
+
+
+def nothing_further(out: dict[int, Scalar], v: Sequence[Scalar], a: Sequence[Scalar]) -> None:
+    """Add nothing."""
 
 
 class Tracer:
@@ -104,7 +113,7 @@ class Tracer:
             if given:
                 self.mechanism = placed(mechanism, given)
                 self.frame = frames(self.mechanism, self.frame.unit)
-            self.formulation = self._formulate(self.mechanism, self.frame, self.drives)
+            self.formulation = self.formulate(self.mechanism, self.frame, self.drives)
             points = map(self.mechanism.point, request.points)
             bodies = map(self.mechanism.body, request.bodies)
             self._points = {
@@ -123,7 +132,7 @@ class Tracer:
         )
         self.unknowns = self.formulation.unknowns
 
-    def _formulate(
+    def formulate(
         self, mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive]
     ) -> Formulation:
         found = constraints(mechanism, frame, drives, self.request.style, self.named)
@@ -163,16 +172,16 @@ class Tracer:
         """Raises SolveError: the mechanism cannot be solved as described, see `select_rows`."""
         if self._alike:
             return select_section(self._alike.first)
-        formulation = self._formulate(*self._described, {})
+        formulation = self.formulate(*self._described, {})
         return select_rows(*self._described, formulation, self.request.rows)
 
-    def _chosen_rows(self, values: Sequence[Any]) -> list[Any]:
+    def chosen(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.chosen]
 
     @cached_property
     def factor(self) -> Elimination:
         """The factored rows at the state, for iterations and, at the solution, for the rates."""
-        return Elimination(self._chosen_rows(self.formulation.rows(self.at)))
+        return Elimination(self.chosen(self.formulation.rows(self.at)))
 
     @property
     def turns(self) -> Sequence[str]:
@@ -186,7 +195,7 @@ class Tracer:
 
     def newton(self) -> Program:
         """One Newton-Raphson iteration of (28), Phi = 0: (29) Phi_Pi dPi = -Phi."""
-        phi = self._chosen_rows(self.formulation.phi(self.at))
+        phi = self.chosen(self.formulation.phi(self.at))
         out: dict[int, Scalar] = {
             # iterations end by this: a pose is off by the residual over sigma, and the next one by
             # the square of that
@@ -217,10 +226,10 @@ class Tracer:
         # (30) Phi_Pi v = nu and (32) Phi_Pi a = gamma are linear: one factor at the pose serves
         # both; the paper iterates, (31)
         if order:
-            v = self.factor.solve(self._chosen_rows(self.formulation.nu(self.at)))
+            v = self.factor.solve(self.chosen(self.formulation.nu(self.at)))
             self.store(out, RATE, v)
         if order == 2:
-            a = self.factor.solve(self._chosen_rows(self.formulation.gamma(self.at, v)))
+            a = self.factor.solve(self.chosen(self.formulation.gamma(self.at, v)))
             self.store(out, RATE_T, a)
         return v, a, out
 
@@ -236,7 +245,7 @@ class Tracer:
             for label, value in values.items()
         }
 
-    def outputs(self) -> Program:
+    def outputs(self, further: Further = nothing_further) -> Program:
         """Return the program of the wanted motions with their rates, and the tests of a solution:
         closure, redundant rows, branch.
 
@@ -245,9 +254,9 @@ class Tracer:
         """
         v, a, out = self._solve_rates(self.request.order)
         phi = self.formulation.phi(self.at)
-        out[self.layout.scalar("closure")] = largest(self._chosen_rows(phi))
+        out[self.layout.scalar("closure")] = largest(self.chosen(phi))
         out[self.layout.scalar("leftover")] = largest([phi[k] for k in self.selection.dropped])
-        return self._outputs(v, a, out)
+        return self._outputs(v, a, out, further)
 
     def outputs_of_rates(self) -> Program:
         """Return the program of the wanted motions and of the branch for given rates."""
@@ -256,20 +265,17 @@ class Tracer:
         )
 
     def _outputs(
-        self, v: Sequence[Scalar], a: Sequence[Scalar], tests: Mapping[int, Scalar]
+        self,
+        v: Sequence[Scalar],
+        a: Sequence[Scalar],
+        tests: Mapping[int, Scalar],
+        further: Further = nothing_further,
     ) -> Program:
         out = {
             **tests,
             self.layout.scalar("branch"): reduce(minimum, self.formulation.branch(self.at), 1.0),
         }
-        twists = self.formulation.twists(self.at, v)
-        accelerations = self.formulation.accelerations(self.at, v, a)
-
-        def moving(body: str) -> tuple[Pose, Twist, Acceleration]:
-            pose, twist = self.at.poses.get(body, GROUND_POSE), twists.get(body, GROUND_TWIST)
-            return pose, twist, accelerations.get(body, GROUND_ACCELERATION)
-
-        unit = self.frame.unit
+        moving, unit = self.moving(v, a), self.frame.unit
         for name, (body, position, arm) in self._points.items():
             found = motion_of_point(position, arm, unit, *moving(body))
             self._store_motion(out, QUANTITIES, name, found)
@@ -279,12 +285,26 @@ class Tracer:
             self._store_motion(
                 out, ("p", "omega", "omega_t"), name, motion_of_frame(p, *moving(name))
             )
+        further(out, v, a)
         if self.request.forces:
+            twists = self.formulation.twists(self.at, v)
+            accelerations = self.formulation.accelerations(self.at, v, a)
             states = BodyStates(self.frame, self.at.poses, twists, accelerations)
             forces = TracedForces(self.mechanism, self._native_rows(), states, self.at, self.drives)
             for name, value in forces.vectors(self.request.forces):
                 self.store(out, name, value)
         return program("outputs", self.tape, out, self.prepared)
+
+    def moving(self, v: Sequence[Scalar], a: Sequence[Scalar]) -> Moving:
+        """Return the motion of each body at unknown rates v and accelerations a, by its name."""
+        twists = self.formulation.twists(self.at, v)
+        accelerations = self.formulation.accelerations(self.at, v, a)
+
+        def found(body: str) -> tuple[Pose, Twist, Acceleration]:
+            pose, twist = self.at.poses.get(body, GROUND_POSE), twists.get(body, GROUND_TWIST)
+            return pose, twist, accelerations.get(body, GROUND_ACCELERATION)
+
+        return found
 
     def _native_rows(self) -> Rows:
         formulation = self.formulation

@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol
 
-from ...algebra import Scalar
+from ...algebra import Scalar, Vec3
+from ...jet import Jet
 from ...program import ITERATIONS, MARGIN, Program, Tape, program
 from ...trajectory import QUANTITIES
 from ..forces.wanted import WantedForces
@@ -19,6 +21,42 @@ from ..formulation.constraints import Style
 # many times less.
 LAST_ITERATION, FIRM = 1e-9, 1.0 / 16.0
 MAX_ITERATIONS = 12
+
+
+class Equation(Protocol):
+    """An output as an equation over the motion of points; see `Quantity` of cases. Equal ones have
+    equal equations.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def points(self) -> tuple[str, ...]: ...
+
+    def terms(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Sequence[Jet]:
+        """Return what the output follows from, over scalars of any kind."""
+        ...
+
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar] | None:
+        """Return squares of two speeds; None for an output without a speed."""
+        ...
+
+
+@dataclass(frozen=True)
+class WantedOutput:
+    """An output that is part of the programs.
+
+    Attributes:
+        derivative: highest wanted time derivative.
+        alone: drivers that alone move for it at each sample, at a rate of one; none of them for the
+            rates of the motion itself.
+        slopes: whether its slopes by the varied geometry are wanted.
+    """
+
+    equation: Equation
+    derivative: int = 0
+    alone: tuple[str, ...] = ()
+    slopes: bool = False
 
 
 @dataclass(frozen=True)
@@ -39,6 +77,7 @@ class Request:
             mechanism's size]; a sparse system iterates as long as it gains by it.
         rows: solved rows of the formulation; by default those independent at the design position.
         forces: wanted forces; they take order 2.
+        outputs: wanted outputs; the order is the one that they take.
     """
 
     drivers: tuple[str, ...]
@@ -52,6 +91,12 @@ class Request:
     last_iteration: float = LAST_ITERATION
     rows: tuple[int, ...] = ()
     forces: WantedForces | None = None
+    outputs: tuple[WantedOutput, ...] = ()
+
+    @property
+    def slopes(self) -> bool:
+        """Whether slopes of any output are wanted."""
+        return any(each.slopes for each in self.outputs)
 
 
 RATE, RATE_T = "rate", "rate_t"
@@ -171,6 +216,19 @@ where the motion is solved by others.
 """
 
 
+OUTPUT, RESTING = "output ", "resting "
+"""Before the names of vectors of outputs: their terms, by quantity; and two speeds of those that
+have no value at rest.
+"""
+SLOPE_OF, TOWARDS = "slope of ", "towards "
+"""Before the names of vectors of slopes: of the terms of an output; and the motion of a place."""
+
+
+def kept_outputs(vectors: Iterable[str]) -> list[str]:
+    """Return the names of the vectors of outputs, of all vectors."""
+    return [name for name in vectors if name.startswith((OUTPUT, RESTING))]
+
+
 def kept_forces(vectors: Iterable[str]) -> list[str]:
     """Return the names of the vectors of forces, of all vectors."""
     prefixes, whole = (EFFORT, ELEMENT, REACTION), (POWER, REDUNDANT, FORCE_SIGMA)
@@ -185,6 +243,7 @@ def kept_motions(request: Request, state: Iterable[str]) -> list[str]:
     """
     order, names = request.order + 1, [*state]
     found = [*names, *(PREDICTED + name for name in names), RATE, RATE_T] if request.state else []
+    found += names if request.slopes else []  # slopes begin at the solved poses
     found += [f"{label} {name}" for name in request.points for label in QUANTITIES[:order]]
     labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]
     return found + [

@@ -13,7 +13,7 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any
 
-from ...algebra import Scalar, Vec3, is_literal_zero, quat, turned_by, vec
+from ...algebra import Quat, Scalar, Vec3, is_literal_zero, quat, turned_by, vec
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Primitive, Row, Twist
 from ...program import cos, sin
@@ -166,6 +166,17 @@ class Cartesian:
             state[f"q {name}"] = tuple(turned_by(at.poses[name].q, 0.5 * dpi))
         for name, k in self.coordinates.items():
             state[f"x {name}"] = (at.state[f"x {name}"][0] + step[k],)
+        return state
+
+    def flow(self, at: Configuration, rates: Sequence[Scalar]) -> State:
+        """Return the rates of the state at rates of the unknowns."""
+        state: dict[str, Sequence[Scalar]] = {}
+        for name, k in self.columns.items():
+            half = 0.5 * self._global(at.poses[name], vec(rates[k + 3 : k + COLUMNS]))
+            state[f"u {name}"] = tuple(rates[k : k + 3])
+            state[f"q {name}"] = tuple(Quat(0.0, half) * at.poses[name].q)
+        for name, k in self.coordinates.items():
+            state[f"x {name}"] = (rates[k],)
         return state
 
     def phi(self, at: Configuration) -> list[Scalar]:

@@ -236,7 +236,7 @@ def _relation(
     scaled = [k * unit for k, unit in zip(weights.values(), units, strict=True)]
     slopes = [*scaled, curve.at(0.0)[1] * units[-1]] if curve else scaled
     # a traced lead is known only later
-    largest = max(abs(k) for k in slopes if hasattr(k, "__abs__"))
+    largest = max(abs(k) for k in slopes if not isinstance(k, Traced))
     return Relation(
         owner,
         {name: k / largest for name, k in zip(weights, scaled, strict=True)},

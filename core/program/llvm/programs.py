@@ -28,6 +28,13 @@ from ..tape import LEAVES, Node, operands, place_of
 SINE_TERMS, COSINE_TERMS = 9, 9
 # pi / 2 in three parts of 33 bits: a multiple of up to 2^20 times each is exact (Cody and Waite).
 HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
+# Coefficients in z = t^2 of atan(t) / t, interpolated at Chebyshev's nodes of 0 <= t <= tan(pi/8),
+# the largest argument after reduction; the error is below 3e-18.
+ARC_TANGENT = (
+    *(1.0, -0.33333333333333326, 0.19999999999997015, -0.1428571428532971, 0.11111111085322109),
+    *(-0.09090908059031191, 0.07692281099937744, -0.06666205259976526, 0.05876834004614161),
+    *(-0.05217312574061591, 0.04499500728984032, -0.03338782450121195, 0.015113765096600925),
+)
 BINARY = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
 EXTREMES = frozenset({"minimum", "maximum"})
 CALLS = {"sqrt": "sqrt", "abs": "fabs", "min": "minimum", "max": "maximum"}
@@ -151,6 +158,30 @@ class Lines:
         value = self.choose(swapped, cosine, sine)
         return self.choose(negative, self.let(f"fneg {self.vector} {value}"), value)
 
+    def arc_tangent(self, y: str, x: str) -> str:
+        """Return the angle of the direction (x, y), in -pi..pi; NaN of zero."""
+        flat, high = self.call("fabs", x), self.call("fabs", y)
+        small, large = self.call("minimum", flat, high), self.call("maximum", flat, high)
+        # atan(t) = pi/4 + atan((t - 1) / (t + 1)) halves the angle, with one division for both
+        steep = self.let(
+            f"fcmp ogt {self.vector} {small},"
+            f" {self.arithmetic('*', large, self.constant(math.tan(math.pi / 8.0)))}"
+        )
+        t = self.arithmetic(
+            "/",
+            self.choose(steep, self.arithmetic("-", small, large), small),
+            self.choose(steep, self.arithmetic("+", small, large), large),
+        )
+        angle = self.arithmetic("*", t, self.polynomial(self.arithmetic("*", t, t), ARC_TANGENT))
+        turned = self.arithmetic("+", angle, self.constant(math.pi / 4.0))
+        angle = self.choose(steep, turned, angle)
+        across = self.let(f"fcmp ogt {self.vector} {high}, {flat}")
+        rest = self.arithmetic("-", self.constant(math.pi / 2.0), angle)
+        angle = self.choose(across, rest, angle)
+        behind = self.let(f"fcmp olt {self.vector} {x}, {self.constant(0.0)}")
+        rest = self.arithmetic("-", self.constant(math.pi), angle)
+        return self.call("copysign", self.choose(behind, rest, angle), y)
+
     def operation(self, op: str, operands: Sequence[str]) -> str:
         """Return the value of a traced operation."""
         if op in BINARY:
@@ -161,6 +192,8 @@ class Lines:
             return self.umax(*operands)
         if op in CALLS:
             return self.call(CALLS[op], *operands)
+        if op == "atan2":
+            return self.arc_tangent(*operands)
         if op == "neg":
             return self.let(f"fneg {self.vector} {operands[0]}")
         if op == "larger":
@@ -188,7 +221,7 @@ def declarations(width: int) -> str:
     )
     two = "\n".join(
         f"declare {vector} @llvm.{name}.v{width}f64({vector}, {vector})"
-        for name in ("minimum", "maximum")
+        for name in ("minimum", "maximum", "copysign")
     )
     words, three = (
         f"<{width} x i64>",
@@ -279,7 +312,17 @@ class _Row(Lines):
         self.lines.append(f"store {self.vector} {value}, ptr {self.place(0)}, align 8")
 
 
-CYCLES = {"/": 24, "sqrt": 32, "larger": 5, "before": 3, "umax": 3, "where": 1, "abs": 1, "neg": 1}
+CYCLES = {
+    "atan2": 90,
+    "/": 24,
+    "sqrt": 32,
+    "larger": 5,
+    "before": 3,
+    "umax": 3,
+    "where": 1,
+    "abs": 1,
+    "neg": 1,
+}
 """Latency [cycles] on vectors of eight on Intel's Golden Cove (uops.info); `OTHERS` for all other
 operations.
 """

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import CaseError
-from kincheck.core.case.case import HELD_BUT, ORDERS
+from kincheck.core.case.case import HELD_BUT
 from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
@@ -118,13 +118,16 @@ def compared(ready):
     along = gradients(ready).along[:, :, samples]
     names = [each.name for each in study.variation.coordinates]
     for r, row in enumerate(study.rows):
-        if row.output.orders < ORDERS:
+        if row.output.forces:
             continue
-        largest = np.abs(along[:, r]).max()
+        largest = np.nanmax(np.abs(along[:, r]))
         for k, name in enumerate(names):
             number = name if name.endswith(".length") else " ".join(name.rsplit(".", 1))
-            explained = known.pop((row.name, number), [0.0] * len(samples))
-            yield row.name, number, np.abs(along[k, r] - explained).max() / (largest or 1.0)
+            without = np.where(np.isnan(along[k, r]), np.nan, 0.0)
+            theirs = np.array(known.pop((row.name, number), without), dtype=float)
+            unlike = np.isnan(along[k, r]) != np.isnan(theirs)
+            off = np.where(unlike, np.inf, np.nan_to_num(np.abs(along[k, r] - theirs)))
+            yield row.name, number, off.max() / (largest or 1.0)
     assert not known
 
 

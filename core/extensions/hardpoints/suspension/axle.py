@@ -10,13 +10,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ....algebra import Vec3
+from ....algebra import Vec3, root
 from ....case.quantity import HIDDEN
-from ....jet import Jet, arctan2, doubles, sqrt, where
+from ....jet import Jet, arctan2, choose, known, sign, sqrt
 from .base import SuspensionOutput, held
 from .corner import PARALLEL, Corner, Side, Vehicle, angle_in_view
 
@@ -37,6 +37,7 @@ class AxleOutput(SuspensionOutput):
 
     measure = "m"
     needs = ("wheel_radius",)
+    further: ClassVar[Mapping[str, tuple[Any, Any]]] = {}
     reads = ("wheel_center", "spin_marker", "wheel_contact")
 
     other: Vehicle = field(metadata=HIDDEN)
@@ -121,6 +122,7 @@ class SteeringRatio(AxleOutput):
     """
 
     type = "steering_ratio"
+    nowhere = "the wheels hardly steer there"
     measure = "1"
     needs = ("rack_per_turn",)
     reads = ("wheel_center", "spin_marker")
@@ -144,8 +146,7 @@ class SteeringRatio(AxleOutput):
         turned = (0.5 * (a + b)).dot
         assert self.vehicle.rack_per_turn is not None
         ratio = 2.0 * np.pi / self.vehicle.rack_per_turn * left.point(self.rack).y.dot / turned
-        known = where(np.abs(turned.x) > NO_STEER * np.abs(left.point(self.rack).y.v), ratio)
-        return np.sign(known.x) * known
+        return known(turned.x, NO_STEER * left.point(self.rack).y.v, sign(ratio.x) * ratio)
 
 
 @dataclass(frozen=True)
@@ -155,6 +156,7 @@ class _WhileSteering(AxleOutput):
     """
 
     needs = ("wheel_radius", "wheelbase")
+    nowhere = "a wheel is straight there, to 0.01 rad, or the wheels toe against each other"
 
     @property
     def orders(self) -> int:
@@ -173,14 +175,14 @@ class _WhileSteering(AxleOutput):
         """Return the output over the samples."""
         a, b = left.spin, right.spin
         first, second = -(a.y / a.x), b.y / b.x  # to the left
-        to_left = np.where(doubles(b.x) > 0.0, 1.0, 0.0)
-        inner = to_left * first - (1.0 - to_left) * second
-        outer = to_left * second - (1.0 - to_left) * first
+        to_left = sign(b.x.x)
+        inner = choose(1.0 + to_left, 1.0, first, -second)
+        outer = choose(1.0 + to_left, 1.0, second, -first)
         assert self.vehicle.wheelbase is not None
         ratio = (left.contact.y + right.contact.y) / self.vehicle.wheelbase
-        x, y = doubles(a.x), doubles(b.x)
-        steered = -np.sign(x * y) * np.minimum(np.abs(x), np.abs(y))
-        return where(steered > STRAIGHT, self.of_cotangents(inner, outer, ratio))
+        value, (x, y) = self.of_cotangents(inner, outer, ratio), (a.x.x, b.x.x)
+        steered = known(x, STRAIGHT, known(y, STRAIGHT, value))
+        return known(x - y, x + y, steered)  # to the same side: of opposite signs
 
 
 @dataclass(frozen=True)
@@ -248,6 +250,7 @@ class _AxleRollCenter(AxleOutput):
     """
 
     reads = _CARRIER
+    nowhere = "the lines from the contact centres to the instant centres are parallel there"
 
     @property
     def orders(self) -> int:
@@ -282,11 +285,11 @@ class _AxleRollCenter(AxleOutput):
         )
         first, second = va.y * a.y + va.z * a.z, vb.y * b.y + vb.z * b.z
         whole = va.y * vb.z + va.z * vb.y
-        crossing = whole.x / (np.hypot(va.y.x, va.z.x) * np.hypot(vb.y.x, vb.z.x))
+        sizes = [v.y.x * v.y.x + v.z.x * v.z.x for v in (va, vb)]
+        parallel = PARALLEL * root(sizes[0] * sizes[1])
         y = (first * vb.z - va.z * second) / whole
         z = (va.y * second + first * vb.y) / whole
-        known = np.abs(crossing) > PARALLEL
-        return where(known, y), where(known, z)
+        return known(whole.x, parallel, y), known(whole.x, parallel, z)
 
 
 @dataclass(frozen=True)

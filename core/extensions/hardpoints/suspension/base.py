@@ -11,20 +11,18 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from functools import reduce
+from typing import Annotated, Any, ClassVar
 
-import numpy as np
-
-from ....algebra import Vec3
+from ....algebra import Scalar, Vec3, where_larger
 from ....case.case import HELD_BUT, PER_TRAVEL
-from ....case.quantity import HIDDEN, PoseQuantity, TypedQuantity
-from ....jet import Jet, where
+from ....case.io.schema import one_of
+from ....case.quantity import HIDDEN, Derived, TypedQuantity
+from ....jet import Jet
 from ....mechanism.mechanism import Mechanism, Point
-from .corner import Corner, Vehicle
+from .corner import Corner, Side, Vehicle
 
-# Samples with a wheel speed below this fraction of the fastest point's speed are left out: a
-# quotient by the travel speed has lost three digits of its rates there, and more at lower speeds.
-STILL = 1e-3
+_SIDES: Any = Annotated[Side, one_of(Side)]
 
 
 @dataclass(frozen=True)
@@ -32,13 +30,14 @@ class SuspensionOutput(TypedQuantity):
     """A quantity of a wheel or an axle, judged, reported and compared like any other output.
 
     Attributes:
-        needs: vehicle attributes that are optional in general, but required here.
         reads: vehicle attributes with the names of the points it reads.
+        nowhere: reason why it has no value at some poses; empty if it has one at all.
         atol, rtol: an error is accepted up to atol [unit] + rtol * range of the reference.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ()
+    further: ClassVar[Mapping[str, tuple[Any, Any]]] = {"side": (_SIDES | None, None)}
     reads: ClassVar[tuple[str, ...]]
+    nowhere: ClassVar[str] = ""
     registry: ClassVar[dict[str, type[SuspensionOutput]]] = {}
 
     name: str
@@ -81,6 +80,16 @@ class SuspensionOutput(TypedQuantity):
     def problem(self) -> str:
         """Reason why this wheel has no such output: found, expected, remedy. Otherwise empty."""
         return ""
+
+    @property
+    def side(self) -> str:
+        """Side of its wheel, or of the first wheel of its axle."""
+        return str(self.vehicle.side)
+
+    @property
+    def undefined(self) -> str:
+        """Reason why solved samples have no value; empty if all have."""
+        return self.nowhere
 
     @property
     def signs(self) -> str:
@@ -138,6 +147,8 @@ class Rate(_OfCorner):
     It is a property of the position: other drivers are held, see `Vehicle.travel`.
     """
 
+    nowhere = "the wheel hardly travels there"
+
     @property
     def orders(self) -> int:
         """Value and rate, which need velocities and accelerations; the value alone where other
@@ -151,9 +162,12 @@ class Rate(_OfCorner):
         return {**super().facts, **held(self.vehicle)}
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the quotient, NaN while the wheel is at rest."""
-        corner = Corner(self.vehicle, at)
-        return where_moving(self.value(corner), corner, at)
+        """Return the quotient; it has no value while the wheel is at rest."""
+        return self.value(Corner(self.vehicle, at))
+
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar]:
+        """Return the squares of the speeds of travel and of the fastest point."""
+        return speeds(self.vehicle, at)
 
 
 def held(vehicle: Vehicle) -> Mapping[str, Any]:
@@ -163,22 +177,19 @@ def held(vehicle: Vehicle) -> Mapping[str, Any]:
     return {HELD_BUT: list(vehicle.travel)} if vehicle.travel else {}
 
 
-def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
-    """Return a quotient by the travel speed, NaN at samples with a negligible travel speed relative
-    to the fastest point.
-    """
-    travel = np.abs(corner.center.z.v)
-    speeds = [
-        np.sqrt(sum(component.v * component.v for component in point)) for point in at.values()
-    ]
-    # The maximum is over points and samples, not over lanes: lanes may hold variants of a design,
-    # which must not be judged by one another.
-    fastest = np.max(np.nan_to_num(np.array(speeds)), axis=(0, 1), initial=0.0)
-    return where(travel > STILL * fastest, quotient)
+def speeds(wheel: Vehicle, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar]:
+    """Return the squares of the wheel's speed of travel and of the speed of the fastest point."""
+    found = [sum(x.v * x.v for x in point) for point in at.values()]
+    travel = Corner(wheel, at).center.z.v
+    return travel * travel, reduce(_larger, found)
+
+
+def _larger(a: Scalar, b: Scalar) -> Scalar:
+    return where_larger(a, b, a, b)
 
 
 @dataclass(frozen=True)
-class PerTravel(PoseQuantity):
+class PerTravel(Derived):
     """The derivative of an output by wheel travel (jounce): the upward displacement of the wheel
     centre relative to the vehicle's body.
 
@@ -237,6 +248,11 @@ class PerTravel(PoseQuantity):
         return self.of_output.vehicle
 
     @property
+    def undefined(self) -> str:
+        """Reason why it has no value at some poses."""
+        return self.of_output.undefined or Rate.nowhere
+
+    @property
     def signs(self) -> str:
         """Convention of signs and axes, in words."""
         return self.of_output.signs
@@ -253,6 +269,9 @@ class PerTravel(PoseQuantity):
         }
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the slope, NaN while the wheel is at rest."""
-        corner = Corner(self.vehicle, at)
-        return where_moving(self.of_output.of(at, design).dot / corner.center.z.dot, corner, at)
+        """Return the slope; it has no value while the wheel is at rest."""
+        return self.of_output.of(at, design).dot / Corner(self.vehicle, at).center.z.dot
+
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar]:
+        """Return the squares of the speeds of travel and of the fastest point."""
+        return speeds(self.vehicle, at)

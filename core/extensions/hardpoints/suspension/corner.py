@@ -19,42 +19,15 @@ from enum import StrEnum
 from functools import cached_property
 from typing import TypeAlias
 
-import numpy as np
-
-from ....algebra import Scalar, Vec3, cross, vec
+from ....algebra import Scalar, Vec3, cross, is_array, vec
 from ....case.case import MARKER
-from ....jet import Jet, arctan2, doubles, each, norm, sqrt, where
+from ....case.quantity import Convention
+from ....jet import Jet, arctan2, choose, each, known, norm, sqrt
 from ....mechanism.mechanism import Mechanism, Vector
-from ....trajectory import Array
 
 # Distance from the wheel centre to the markers on the wheel carrier [m]: a rim's radius, so
 # directions keep all digits of positions.
 MARKER_DISTANCE = 0.25
-
-
-class Convention(StrEnum):
-    """Standard of the axes and signs of outputs. SAE J670 also allows z up; here its name means the
-    historical z down.
-    """
-
-    ISO_8855 = "iso8855"
-    SAE_J670 = "sae_j670"
-
-    @property
-    def words(self) -> str:
-        """Standard and its axes, in words."""
-        return (
-            "ISO 8855 (x forward, y left, z up)"
-            if self is Convention.ISO_8855
-            else "SAE J670 (x forward, y right, z down)"
-        )
-
-    @property
-    def up(self) -> int:
-        """Factor from an upward component to one along z, and from a leftward component to one
-        along y.
-        """
-        return 1 if self is Convention.ISO_8855 else -1
 
 
 class Side(StrEnum):
@@ -244,7 +217,7 @@ class Corner:
         """Length of the spin's projection on the road [-]; NaN for a wheel on its side."""
         s = self.spin
         level = sqrt(s.x * s.x + s.y * s.y)
-        return where(doubles(level) > PARALLEL, level)
+        return known(level.x, PARALLEL, level)
 
     @cached_property
     def heading(self) -> Vec3:
@@ -312,12 +285,11 @@ class Corner:
         """
         lower, axis = self.kingpin
         contact = self.contact
-        size = doubles(norm(axis, 0.0))
-        rise = where(np.abs(doubles(axis.z)) > PARALLEL * size, axis.z)
+        rise = known(axis.z.x, PARALLEL * norm(axis, 0.0).x, axis.z)
         return lower + ((contact.z - lower.z) / rise) * axis - contact
 
 
-def angle_in_view(y: Jet, x: Jet, size: Array | float = 1.0) -> Jet:
+def angle_in_view(y: Jet, x: Jet, size: Scalar = 1.0) -> Jet:
     """Return the angle of a direction in a view [rad], in -pi..pi; NaN where the direction is that
     of the view itself.
 
@@ -326,10 +298,12 @@ def angle_in_view(y: Jet, x: Jet, size: Array | float = 1.0) -> Jet:
     Args:
         size: length of the direction, its component along the view included.
     """
-    angle, seen = arctan2(y, x), np.hypot(doubles(x), doubles(y))
-    if np.asarray(angle.x).dtype != object:  # a proved number ends here
-        angle += np.where(angle.x < HALF_TURN - np.pi, 2.0 * np.pi, 0.0)
-    return where(seen > PARALLEL * size, angle)
+    angle, limit = arctan2(y, x), PARALLEL * size
+    if not (is_array(angle.x) and angle.x.dtype == object):  # proofs end here
+        # minus half a turn, but for a margin, is farther from a quarter than any other angle
+        beyond = angle.x - 0.5 * math.pi
+        angle = choose(beyond, 1.5 * math.pi - HALF_TURN, angle + 2.0 * math.pi, angle)
+    return known(y.x * y.x + x.x * x.x, limit * limit, angle)
 
 
 def velocity(a: Vec3) -> Vec3:

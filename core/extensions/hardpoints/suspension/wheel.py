@@ -21,7 +21,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....algebra import Vec3, cross
-from ....jet import Jet, arctan2, doubles, norm, sqrt
+from ....jet import Jet, arctan2, norm, sqrt
 from ....trajectory import Array
 from .base import Attitude, Change, Rate, WheelOutput
 from .corner import Axle, Convention, Corner, Reaction, angle_in_view, distance, velocity
@@ -50,6 +50,7 @@ class Toe(Attitude):
     """
 
     type = "toe"
+    nowhere = "the wheel lies on its side there"
     positive = "toe-in"
 
     def value(self, corner: Corner) -> Jet:
@@ -210,6 +211,7 @@ class _Inclination(Attitude):
 
     needs = ("kingpin",)
     reads = ("wheel_center", "kingpin_points")
+    nowhere = "the steering axis lies along the view there"
 
 
 @dataclass(frozen=True)
@@ -222,7 +224,7 @@ class Caster(_Inclination):
     def value(self, corner: Corner) -> Jet:
         """Return the caster angle [rad]."""
         _, axis = corner.kingpin
-        return angle_in_view(-axis.x, axis.z, doubles(norm(axis, 0.0)))
+        return angle_in_view(-axis.x, axis.z, norm(axis, 0.0).x)
 
 
 @dataclass(frozen=True)
@@ -235,7 +237,7 @@ class KingpinInclination(_Inclination):
     def value(self, corner: Corner) -> Jet:
         """Return the kingpin inclination [rad]."""
         _, axis = corner.kingpin
-        return angle_in_view(-axis.y, axis.z, doubles(norm(axis, 0.0)))
+        return angle_in_view(-axis.y, axis.z, norm(axis, 0.0).x)
 
 
 @dataclass(frozen=True)
@@ -247,6 +249,7 @@ class _GroundOffset(Attitude):
     measure = "m"
     needs = ("wheel_radius", "kingpin")
     reads = ("wheel_center", "spin_marker", "wheel_contact", "kingpin_points")
+    nowhere = "the steering axis is parallel to the road there"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,199 @@
+"""Outputs of many designs of a case over its sweep, and their slopes by the geometry.
+
+The equations of the outputs are part of the compiled programs. What only a whole sweep tells is
+added here: turns of angles, signs of Euler parameters, and samples at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..jet import Jet
+from ..kinematics import (
+    ForcesOfDesigns,
+    NativeSolver,
+    PreparedDesigns,
+    Variants,
+    WantedOutput,
+)
+from ..mechanism.motions import Path
+from ..trajectory import Array
+from .case import HELD_BUT, Case, Quantity
+from .measures import ForceMeasure, JointAngle, Orientation
+from .quantity import ORDERS
+from .turns import Completion, over_sweep
+
+TOL = 1e-12
+"""Largest accepted residual, relative to the mechanism's size, as in `kincheck run`."""
+# Designs solved at once: enough to make the cost of the calls for their outputs negligible.
+# `solve_designs` has no outputs, and is as fast with a quarter of them.
+TOGETHER = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class DesignOutputs:
+    """A case made ready for many designs, as one program with its outputs.
+
+    Attributes:
+        outputs: of the case, by name.
+        derivatives: highest kept time derivative of each output.
+    """
+
+    case: Case
+    outputs: Mapping[str, Quantity]
+    derivatives: Mapping[str, int]
+    designs: PreparedDesigns
+    path: Path
+
+    @classmethod
+    def of(
+        cls,
+        case: Case,
+        varied: Collection[str],
+        *,
+        derivative: int = 0,
+        slopes: Collection[str] = (),
+        bodies: Sequence[str] = (),
+    ) -> DesignOutputs:
+        """Return a case with a compiled model.
+
+        Args:
+            varied: varied places, see `NativeSolver.prepare_designs`.
+            derivative: highest wanted time derivative; outputs have theirs as far as it is known.
+            slopes: names of outputs whose slopes by the varied places are wanted.
+            bodies: names of those whose poses are wanted.
+
+        Raises:
+            SolveError: drivers and degrees of freedom do not match, or the mechanism does not close
+                at the design position.
+        """
+        outputs = {each.name: each for each in case.outputs}
+        derivatives = {
+            # turns and signs are told by rates
+            name: max(derivative, 1)
+            if isinstance(each, JointAngle | Orientation)
+            else min(derivative, each.orders - 1)
+            for name, each in outputs.items()
+        }
+        wanted = [
+            WantedOutput(
+                each, derivatives[name], tuple(each.facts.get(HELD_BUT, ())), name in slopes
+            )
+            for name, each in outputs.items()
+            if not each.forces
+        ]
+        # an output with one derivative less is a quotient of velocities; with two less it contains
+        # derivatives of velocities. Rates by drivers that move alone are solved beside.
+        orders = [
+            ORDERS - outputs[each.equation.name].orders + each.derivative
+            for each in wanted
+            if not each.alone
+        ]
+        designs = NativeSolver(order=max(orders, default=0)).prepare_designs(
+            case.mechanism,
+            case.sweep.path,
+            tuple(varied),
+            forces=case.forces,
+            bodies=bodies,
+            outputs=wanted,
+        )
+        return cls(case, outputs, derivatives, designs, case.sweep.path)
+
+    def on_path(self, path: Path) -> DesignOutputs:
+        """Return the same program on another path of the same drivers."""
+        return replace(self, designs=self.designs.on_path(path), path=path)
+
+    @property
+    def at_once(self) -> int:
+        """The number of designs to solve together."""
+        return self.designs.at_once(TOGETHER)
+
+    def solve(self, geometry: Array, tol: float = TOL, *, alone: bool = True) -> SolvedDesigns:
+        """Solve designs at all samples.
+
+        Args:
+            geometry: numbers of the varied places in their order, shape (numbers, V).
+            tol, alone: see `PreparedDesigns.solve`.
+        """
+        return SolvedDesigns(self, geometry, tol, self.designs.solve(geometry, tol, alone=alone))
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedDesigns:
+    """The outputs of V designs over n samples.
+
+    Attributes:
+        geometry: of the designs.
+        found: their motion.
+    """
+
+    ready: DesignOutputs
+    geometry: Array
+    tol: float
+    found: Variants
+    _completions: dict[str, Completion] = field(default_factory=dict[str, Completion])
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """Whether each sample of each design was reached, shape (n, V)."""
+        return self.found.solved
+
+    @cached_property
+    def _forces(self) -> ForcesOfDesigns | None:
+        return self.ready.designs.forces(self.found, self.geometry, self.tol)
+
+    def pose(self, body: str) -> Array:
+        """Return origin [m] and Euler parameters of a body that was asked for, shape (7, n, V)."""
+        return self.ready.designs.pose(self.found, body)
+
+    def values(self, name: str, derivative: int = 0) -> Array:
+        """Return an output, or a kept time derivative of it, shape (n, V); NaN where it has no
+        value.
+        """
+        output = self.ready.outputs[name]
+        if isinstance(output, ForceMeasure):
+            assert self._forces is not None  # the case asks for them
+            return self._forces.read(output.values)
+        with np.errstate(all="ignore"):  # unknown numbers are NaN, and so is all they give
+            jet = self._completed(name)(self._terms(name))
+        values = np.asarray((jet.x, jet.v, jet.a)[derivative])
+        known = np.isfinite(values)
+        return values if known.all() else np.where(known, values, np.nan)
+
+    def slopes(self, towards: Array) -> Iterator[tuple[str, Array]]:
+        """Yield the outputs whose slopes are wanted with their derivatives by motions of the
+        geometry, drivers held, shape (motions, n, V); NaN where an output has no value.
+
+        Args:
+            towards: motions of the varied numbers, shape (numbers, motions).
+        """
+        if not self.ready.designs.route.model.request.slopes:
+            return
+        for name, moves in self.ready.designs.slopes(self.found, self.geometry, towards).items():
+            known, x = np.isfinite(self.values(name)), self.ready.designs.output(self.found, name)
+            slopes = np.empty((towards.shape[1], *known.shape))
+            for k, moved in enumerate(moves):
+                # by a motion in place of time
+                jets = [Jet(*each, np.nan) for each in zip(x, moved, strict=True)]
+                slopes[k] = np.where(known, self._completed(name)(jets).v, np.nan)
+            yield name, slopes
+
+    def _terms(self, name: str) -> list[Jet]:
+        designs, orders = self.ready.designs, range(self.ready.derivatives[name] + 1)
+        known = [designs.output(self.found, name, order) for order in orders]
+        unknown = [np.broadcast_to(np.nan, known[0].shape)] * (ORDERS - len(known))
+        return [Jet(*each) for each in zip(*known, *unknown, strict=True)]
+
+    def _completed(self, name: str) -> Completion:
+        if name not in self._completions:
+            ready, resting = self.ready, self.ready.designs.resting(self.found, name)
+            mechanism, output = ready.case.mechanism, ready.outputs[name]
+            self._completions[name] = over_sweep(
+                mechanism, ready.path, output, self._terms(name), resting
+            )
+        return self._completions[name]

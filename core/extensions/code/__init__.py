@@ -1,0 +1,9 @@
+"""A solved case as code: its programs as C, as JavaScript, and as an FMU with C inside."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(
+    __name__,
+    needs=["exports", "sweep"],
+    codes={"c": "c:files", "js": "js:files", "fmu": "fmu:files"},
+)

@@ -1,0 +1,326 @@
+"""Dialects: the programs as lines of C or of JavaScript, and one text of the steps for both.
+
+The text is written in what both languages have in common; declarations and functions of mathematics
+differ by a word.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from ...case.quantity import STILL
+from ...kinematics.compiled.request import TIME
+from ...mechanism.motions import Absolute, Motion, Ramp, Sine
+from ...program import Program
+from ...unit_text import with_unit
+from .solved import CodeOutput, SolvedCase
+
+OPERATIONS = {
+    "+": "({0} + {1})",
+    "-": "({0} - {1})",
+    "*": "({0} * {1})",
+    "/": "({0} / {1})",
+    "neg": "(-{0})",
+    "sqrt": "sqrt({0})",
+    "sin": "sin({0})",
+    "cos": "cos({0})",
+    "atan2": "atan2({0}, {1})",
+    "abs": "fabs({0})",
+    # what is no number stays none
+    "min": "({0} < {1} || {0} != {0} ? {0} : {1})",
+    "max": "({0} > {1} || {0} != {0} ? {0} : {1})",
+    "larger": "(fabs({0}) > fabs({1}) ? 1.0 : 0.0)",
+    "where": "({0} != 0.0 ? {1} : {2})",
+}
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """A language.
+
+    Attributes:
+        words: words of the text, and those of the language in their place.
+        table: declaration of a table, of its kind, name and numbers.
+    """
+
+    words: dict[str, str]
+    table: str
+
+    def text(self, text: str) -> str:
+        """Return a text of the steps in this language."""
+        return re.sub(r"\b[A-Za-z]\w*\b", lambda word: self.words.get(word[0], word[0]), text)
+
+
+C = Dialect(
+    {
+        "REAL": "const double",
+        "VALUE": "double",
+        "COUNT": "int",
+        "NUMBER": "double",
+        "WHOLE": "int",
+        "LANE": "double *",
+        "FROM": "const double *",
+        "ACTION": "static void",
+        "ANSWER": "static int",
+        "NOTHING": "NAN",
+    },
+    "static const {kind} {name}[] = {{{numbers}}};",
+)
+JAVASCRIPT = Dialect(
+    {
+        "REAL": "const",
+        "VALUE": "let",
+        "COUNT": "let",
+        "NUMBER": "",
+        "WHOLE": "",
+        "LANE": "",
+        "FROM": "",
+        "ACTION": "function",
+        "ANSWER": "function",
+        "NOTHING": "NaN",
+        "INFINITY": "Infinity",
+        "fabs": "Math.abs",
+        **{name: f"Math.{name}" for name in ("sqrt", "sin", "cos", "atan2", "floor")},
+    },
+    "const {name} = [{numbers}];",
+)
+
+STEPS = """
+ACTION copy(LANE to, FROM lane) { for (COUNT k = 0; k < SIZE; k++) to[k] = lane[k]; }
+
+ACTION carry(LANE s) { for (COUNT k = 0; k < CARRIED; k++) s[CARRY_TO[k]] = s[CARRY_FROM[k]]; }
+
+ANSWER settle(LANE s) {
+  for (COUNT k = 0; k < MOST; k++) {
+    newton(s);
+    if (!(s[RESIDUAL] < INFINITY)) return 0;
+    if (s[RESIDUAL] < TOLERANCE) return 1;
+  }
+  return 0;
+}
+
+/* one step of any length from lane w to time t, in lane n: 0, or why it is none */
+ANSWER attempt(LANE n, FROM w, NUMBER t) {
+  copy(n, w);
+  sample(n, t);
+  predict(n);
+  n[IS_DONE] = settle(n);
+  outputs(n);
+  alone_gaps(n);
+  alone(n);
+  return n[MARGIN] > 0.0 ? 0 : n[IS_DONE] > 0.0 ? 2 : 1;
+}
+
+ACTION begin(LANE s) {
+  sample(s, s[AT]);
+  outputs(s);
+  carry(s);
+  s[EARLIER] = s[HERE];
+}
+
+/* lane w to time t by as many steps as it takes, halved where one fails; n is for attempts */
+ANSWER travel(LANE w, LANE n, NUMBER goal) {
+  VALUE step = goal - w[AT];
+  COUNT halvings = 0;
+  for (COUNT k = 0; w[AT] != goal; k++) {
+    VALUE to = w[AT] + step;
+    if (step > 0.0 ? to > goal : to < goal) to = goal;
+    COUNT failed = attempt(n, w, to);
+    if (failed == 0) {
+      keep(n, w, to - w[AT]);
+      carry(n);
+      n[AT] = to;
+      copy(w, n);
+      step = 2.0 * step;
+      halvings = 0;
+    } else {
+      step = 0.5 * step;
+      halvings = halvings + 1;
+      if (halvings > 40 || k > 20000 || !(fabs(step) > 0.0)) {
+        return w[SIGMA] < 0.1 * w[LARGEST] ? 2 : failed;
+      }
+    }
+  }
+  return 0;
+}
+"""
+ASSEMBLE = """
+/* lane s at the design position of its geometry: 1 if it closes there */
+ANSWER assemble(LANE s) {
+  prepare(s);
+  stand(s);
+  for (COUNT k = 0; k < ASSEMBLING; k++) {
+    newton(s);
+    if (!(s[RESIDUAL] > CLOSED)) break;
+  }
+  outputs(s);
+  return s[CLOSURE] <= CLOSED && s[BRANCH] > 0.0 ? 1 : 0;
+}
+"""
+
+
+def program_text(name: str, program: Program) -> str:
+    """Return a program as a function of a lane."""
+    repeated = program.times > 1
+    lines: list[str] = []
+    for k, (op, *read) in enumerate(program.nodes):
+        if op == "input":
+            value = f"s[{int(read[0])}{' + k' if repeated else ''}]"
+        elif op == "const":
+            value = _constant(float(read[0]))
+        else:
+            value = OPERATIONS[op].format(*(f"v{int(x)}" for x in read))
+        lines.append(f"REAL v{k} = {value};")
+    if not repeated:
+        lines += [f"s[{slot}] = v{k};" for slot, k in program.outputs.items()]
+        return "\n".join([f"ACTION {name}(LANE s) {{", *(f"  {each}" for each in lines), "}"])
+    largest = [f"VALUE m{slot} = 0.0;" for slot in program.outputs]
+    lines += [
+        f"if (v{k} > m{slot} || v{k} != v{k}) m{slot} = v{k};"
+        for slot, k in program.outputs.items()
+    ]
+    return "\n".join(
+        [
+            f"ACTION {name}(LANE s) {{",
+            *(f"  {each}" for each in largest),
+            f"  for (COUNT k = 0; k < {program.times}; k++) {{",
+            *(f"    {each}" for each in lines),
+            "  }",
+            *(f"  s[{slot}] = m{slot};" for slot in program.outputs),
+            "}",
+        ]
+    )
+
+
+def _constant(value: float) -> str:
+    if math.isfinite(value):
+        return repr(value)
+    return "NOTHING" if math.isnan(value) else "INFINITY" if value > 0.0 else "(-INFINITY)"
+
+
+def _drive(slots: Sequence[int], motion: Motion, factor: float) -> Iterator[str]:
+    """Yield the lines that set the five numbers of a driver at time t."""
+    shift = 0.0
+    if isinstance(motion, Absolute):
+        motion, shift = motion.motion, motion.design
+    if isinstance(motion, Sine):
+        w = 2.0 * math.pi * motion.frequency
+        angle = f"({w!r} * t + {motion.phase!r})"
+        x = f"{motion.amplitude!r} * sin{angle} - {shift!r}"
+        v = f"{motion.amplitude * w!r} * cos{angle}"
+        a = f"{-motion.amplitude * w * w!r} * sin{angle}"
+    else:
+        assert isinstance(motion, Ramp)
+        x, v, a = f"{motion.rate!r} * t - {shift!r}", repr(motion.rate), "0.0"
+    yield f"x = {x};"
+    for slot, value in zip(slots[:3], ("x", v, a), strict=True):
+        yield f"s[{slot}] = {factor!r} * ({value});"
+    yield f"s[{slots[3]}] = cos(0.5 * x);"
+    yield f"s[{slots[4]}] = sin(0.5 * x);"
+
+
+def _kept(each: CodeOutput) -> Iterator[str]:
+    """Yield the lines that count the turns of an output, or keep the sign of an attitude."""
+    at = each.kept
+    if each.period:
+        ((x,), (v,), *_) = each.slots
+        yield f"x = w[{at}] + 0.5 * (w[{v}] + n[{v}]) * h;"
+        period = repr(each.period)
+        yield f"n[{at}] = n[{x}] + {period} * floor((x - n[{x}]) / {period} + 0.5);"
+    elif each.completion:
+        own = [f"n[{slot}]" for slot in each.slots[0]]
+        dot = " + ".join(f"{x} * w[{at + k}]" for k, x in enumerate(own))
+        yield f"x = {dot} < 0.0 ? -1.0 : 1.0;"
+        yield from (f"n[{at + k}] = x * {x};" for k, x in enumerate(own))
+
+
+def _told(k: int, each: CodeOutput) -> Iterator[str]:
+    """Yield the lines that write the three orders of an output at rate r."""
+    factors = ("", "r * ", "r * r * ")
+    if each.completion:
+        # Euler parameters go on with their sign; a rotation vector is of half a turn at most
+        first, turned = each.slots[0], each.quantity.unit != "1"
+        sign = (
+            f"s[{first[0]}]"
+            if turned
+            else " + ".join(f"s[{slot}] * s[{each.kept + j}]" for j, slot in enumerate(first))
+        )
+        yield f"x = {sign} < 0.0 ? -1.0 : 1.0;"
+        yield from (
+            f"c[{4 * order + j}] = x * s[{slot}];"
+            for order, slots in enumerate(each.slots)
+            for j, slot in enumerate(slots)
+        )
+        yield f"complete_{k}(c);"
+        yield from (f"out[{3 * k + j}] = {factors[j]}c[{j}];" for j in range(3))
+        return
+    known = ["NOTHING"] * 3
+    for order, (slot,) in enumerate(each.slots):
+        known[order] = f"{factors[order]}s[{slot}]"
+    if each.period:
+        known[0] = f"s[{each.kept}]"
+    if each.resting:
+        own, fastest = each.resting
+        yield f"x = s[{own}] > {STILL**2!r} * s[{fastest}] ? 1.0 : NOTHING;"
+        known = [f"x * {value}" for value in known]
+    yield from (f"out[{3 * k + j}] = {value};" for j, value in enumerate(known))
+
+
+def _function(head: str, body: Iterable[str]) -> str:
+    return "\n".join([f"{head} {{", *(f"  {line}" for line in body), "}"])
+
+
+def steps_text(solved: SolvedCase) -> str:
+    """Return the functions of a lane: programs, samples, steps and outputs."""
+    time = solved.model.slots[TIME]
+    drives = [line for each in solved.drives() for line in _drive(*each)]
+    kept = [line for each in solved.outputs for line in _kept(each)]
+    told = [line for k, each in enumerate(solved.outputs) for line in _told(k, each)]
+    programs = [program_text(name, each) for name, each in solved.programs.items()]
+    parts = [
+        *programs,
+        _function("ACTION sample(LANE s, NUMBER t)", ["VALUE x;", f"s[{time}] = t;", *drives]),
+    ]
+    steps = STEPS.strip()
+    if kept:
+        parts.append(_function("ACTION keep(LANE n, FROM w, NUMBER h)", ["VALUE x;", *kept]))
+    else:
+        steps = steps.replace("      keep(n, w, to - w[AT]);\n", "")
+    if solved.parameters:
+        values = (0.0, 0.0, 0.0, 1.0, 0.0)
+        still = [
+            f"s[{slot}] = {value!r};"
+            for slots, *_ in solved.drives()
+            for slot, value in zip(slots, values, strict=True)
+        ]
+        parts.append(_function("ACTION stand(LANE s)", [f"s[{time}] = 0.0;", *still]))
+        parts.append(ASSEMBLE.strip())
+        moved = [
+            f"if (which == {k}) s[{slot}] = s[{slot}] + {change!r} * change;"
+            for k, each in enumerate(solved.parameters)
+            for slot, change in each.moves.items()
+        ]
+        parts.append(_function("ACTION move_geometry(LANE s, WHOLE which, NUMBER change)", moved))
+    own = ["VALUE x;"] if any(line.startswith("x =") for line in told) else []
+    own += ["SCRATCH"] if any(each.completion for each in solved.outputs) else []
+    parts += [steps, _function("ACTION tell(FROM s, LANE out, NUMBER r)", [*own, *told])]
+    return "\n\n".join(parts)
+
+
+def tables(solved: SolvedCase) -> dict[str, Sequence[float]]:
+    """Return the tables of the code by name: whole numbers but for the start."""
+    carried = solved.model.plan.carried
+    return {
+        "CARRY_FROM": [source for source, _ in carried],
+        "CARRY_TO": [target for _, target in carried],
+        "START": solved.start,
+    }
+
+
+def words_of(solved: SolvedCase) -> tuple[list[str], list[str]]:
+    """Return the names of the outputs and of the parameters, with their units."""
+    outputs = [with_unit(each.quantity.name, each.quantity.unit) for each in solved.outputs]
+    return outputs, [with_unit(each.name, each.unit) for each in solved.parameters]

@@ -1,0 +1,92 @@
+"""A solved case as JavaScript: NAME.mjs, one class without dependencies."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+
+from ...case.case import Case
+from .c import identifier
+from .dialects import JAVASCRIPT, steps_text, tables, words_of
+from .solved import SolvedCase, solved_case
+
+CLASS = """
+export class Mechanism {{
+  /* the state is three lanes, then the value of each parameter, then whether the start closes */
+  constructor() {{
+    this.state = new Float64Array(3 * SIZE + PARAMETERS + 1);
+    this.lanes = [0, 1, 2].map((k) => this.state.subarray(k * SIZE, (k + 1) * SIZE));
+    this.values = this.state.subarray(3 * SIZE);
+    this.start();
+  }}
+  outputs() {{ return OUTPUTS; }}
+  output(which) {{ return NAMES[which] ?? ""; }}
+  size() {{ return 8 * this.state.length; }}
+  start() {{
+    copy(this.lanes[0], START);
+    begin(this.lanes[0]);
+    for (let k = 0; k < PARAMETERS; k++) this.values[k] = NOMINAL[k];
+    this.values[PARAMETERS] = 1;
+  }}
+  /* 0, and three numbers of each output: value, velocity and acceleration; or 1: the iteration does
+     not converge, 2: a lock-up or another branch is in between. State and outputs then stay. */
+  move(driver, rate, outputs) {{
+    const [s, w, n] = this.lanes, goal = (driver - DESIGN) / PACE, r = rate / PACE;
+    if (!Number.isFinite(goal) || !Number.isFinite(r) || !(this.values[PARAMETERS] > 0)) return 1;
+    copy(w, s);
+    const failed = travel(w, n, goal);
+    if (failed) return failed;
+    copy(s, w);
+    tell(s, outputs, r);
+    return 0;
+  }}
+  parameters() {{ return PARAMETERS; }}
+  parameter(which) {{ return PARAMETER_NAMES[which] ?? ""; }}
+  nominal(which) {{ return NOMINAL[which] ?? NaN; }}
+  /* the state returns to the design position */
+  set(which, value) {{{set}}}
+}}
+export default Mechanism;
+"""
+SET = """
+    if (!(which >= 0 && which < PARAMETERS)) return;
+    const s = this.lanes[0];
+    this.values[which] = value;
+    copy(s, START);
+    for (let k = 0; k < PARAMETERS; k++) move_geometry(s, k, this.values[k] - NOMINAL[k]);
+    this.values[PARAMETERS] = assemble(s);
+    begin(s);
+  """
+
+
+def files(case: Case, places: Sequence[str]) -> Mapping[str, bytes]:
+    """Return the bytes of NAME.mjs, by the name of the file.
+
+    Raises:
+        KincheckError: the case has a part that the code cannot have.
+    """
+    return {f"{identifier(case.name)}.mjs": source(solved_case(case, places)).encode()}
+
+
+def source(solved: SolvedCase) -> str:
+    """Return the module."""
+    known = tables(solved) | {"NOMINAL": [each.nominal for each in solved.parameters]}
+    outputs, parameters = words_of(solved)
+    return "\n".join(
+        [
+            f"/* {solved.case.name}, written by kincheck: lengths in m, angles in rad */",
+            *(f"const {key} = {value!r};" for key, value in solved.numbers.items()),
+            f"const CARRIED = {len(known['CARRY_TO'])};",
+            *(
+                JAVASCRIPT.table.format(name=table, numbers=", ".join(map(repr, values)))
+                for table, values in known.items()
+            ),
+            f"const NAMES = {json.dumps(outputs)};",
+            f"const PARAMETER_NAMES = {json.dumps(parameters)};",
+            "",
+            JAVASCRIPT.text(steps_text(solved)).replace(
+                "SCRATCH", "const c = new Float64Array(12);"
+            ),
+            CLASS.format(set=SET if solved.parameters else ""),
+        ]
+    )

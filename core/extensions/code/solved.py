@@ -1,0 +1,271 @@
+"""A case ready to be written as code: its compiled programs, the layout of a lane, its drivers as
+functions of time, its outputs and its parameters.
+
+The state of the code is three lanes: the current one, the one on its way, and the next attempt. A
+lane holds the slots of the programs, then the numbers of `Tail`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...algebra import Scalar
+from ...case.case import TIME as SWEPT_TIME
+from ...case.case import Case, Quantity
+from ...case.designs import DesignOutputs
+from ...case.measures import Orientation
+from ...errors import KincheckError, shortened
+from ...jet import Jet, arctan2, sqrt
+from ...joints.base import Kind
+from ...kinematics.compiled.compiled_model import ASSEMBLING, CLOSED, Model
+from ...kinematics.compiled.request import (
+    EARLIER,
+    FROM,
+    LARGEST_SIGMA,
+    OUTPUT,
+    RESTING,
+    SIGMA,
+    TIME,
+    accept_by,
+)
+from ...mechanism.motions import Absolute, Motion, Ramp, Sine
+from ...program import DONE, MARGIN, Program, Tape, program, where_larger
+from ...trajectory import QUANTITIES
+from ..sweep.curves import prepare_curves
+from ..sweep.varied_places import Geometry
+
+TOL = 1e-12
+"""Largest accepted residual, as of `kincheck run`."""
+SMALL = 1e-4
+"""Square of the sine of half an angle below which three terms of the series of an angle over its
+sine give all digits: the fourth is 35/576 of its cube.
+"""
+
+
+@dataclass(frozen=True)
+class CodeOutput:
+    """An output in the code.
+
+    Attributes:
+        slots: of its terms in a lane, by order; unknown orders have none.
+        resting: slots of the two speeds of an output that has no value at rest.
+        period: of an angle that counts turns; zero for none.
+        at_design: value of such an angle at the design position.
+        kept: first number behind the slots that remembers its turns or its sign.
+        completion: program of an attitude, from four Euler parameters and their rates.
+    """
+
+    quantity: Quantity
+    slots: Sequence[Sequence[int]]
+    resting: Sequence[int] = ()
+    period: float = 0.0
+    at_design: float = 0.0
+    kept: int = 0
+    completion: Program | None = None
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of the geometry that a user of the code sets.
+
+    Attributes:
+        nominal: its value at design [SI], in the axes of its file.
+        moves: slots of the geometry, and their change by it.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    moves: Mapping[int, float]
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedCase:
+    """A case, and all that its code is made of."""
+
+    case: Case
+    model: Model
+    outputs: Sequence[CodeOutput]
+    parameters: Sequence[Parameter]
+    begin: float
+    """Time at which the mechanism is at its design position [s]."""
+
+    @property
+    def size(self) -> int:
+        """Numbers of a lane: the slots, the time, and the kept numbers of outputs."""
+        kept = [each.kept + (4 if each.completion else 1) for each in self.outputs if each.kept]
+        return max([self.at + 1, *kept])
+
+    @property
+    def at(self) -> int:
+        """The number behind the slots that holds the time of the lane."""
+        return len(self.model.slots)
+
+    @property
+    def programs(self) -> Mapping[str, Program]:
+        """The programs in use, by their names in the code."""
+        plan = self.model.plan
+        names = ["predict", "newton", "outputs", *plan.alone]
+        names += ["prepare"] if "prepare" in plan.programs else []
+        found = {name: plan.programs[name] for name in names}
+        for k, each in enumerate(self.outputs):
+            if each.completion is not None:
+                found[f"complete_{k}"] = each.completion
+        return found
+
+    @cached_property
+    def start(self) -> list[float]:
+        """The numbers of a lane at the design position; a number that no program reads is zero."""
+        found = np.zeros(self.size)
+        found[: self.at] = self.model.design
+        for name, value in accept_by(TOL).items():
+            found[self.model.slots[name]] = value
+        found[self.at] = self.begin
+        for each in self.outputs:
+            if each.period:
+                found[each.kept] = each.at_design
+            elif each.completion:
+                found[each.kept] = 1.0
+        return np.where(np.isfinite(found), found, 0.0).tolist()
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The named numbers of the code."""
+        slots, plan = self.model.slots, self.model.plan
+        named = {"RESIDUAL": "residual", "CLOSURE": "closure", "BRANCH": "branch"}
+        named |= {"IS_DONE": DONE, "MARGIN": MARGIN, "SIGMA": FROM + SIGMA}
+        named |= {"LARGEST": FROM + LARGEST_SIGMA, "HERE": FROM + TIME, "EARLIER": EARLIER + TIME}
+        sweep = self.case.sweep
+        return {name: slots[slot] for name, slot in named.items()} | {
+            "SIZE": self.size,
+            "AT": self.at,
+            "MOST": plan.most,
+            "TOLERANCE": plan.tolerance,
+            "ASSEMBLING": ASSEMBLING,
+            "CLOSED": CLOSED,
+            "OUTPUTS": len(self.outputs),
+            "PARAMETERS": len(self.parameters),
+            "DESIGN": 0.0 if sweep.driver == SWEPT_TIME else sweep.design,
+            "PACE": 1.0 if sweep.driver == SWEPT_TIME else sweep.pace,
+        }
+
+    @property
+    def driver_unit(self) -> str:
+        """Unit of the driver's value."""
+        driver = self.case.sweep.driver
+        if driver == SWEPT_TIME:
+            return "s"
+        return "rad" if self.case.mechanism.driver(driver).turns else "m"
+
+    def drives(self) -> list[tuple[Sequence[int], Motion, float]]:
+        """Return for each moving driver its five slots, its motion from the design, and the factor
+        from SI to the unit of the slots.
+        """
+        found: list[tuple[Sequence[int], Motion, float]] = []
+        for name, motion in self.case.sweep.path.motions.items():
+            turns = self.case.mechanism.driver(name).turns
+            factor = 1.0 if turns else 1.0 / self.model.frame.unit
+            found.append((self.model.vectors[f"drive {name}"], motion, factor))
+        return found
+
+
+def solved_case(case: Case, places: Sequence[str]) -> SolvedCase:
+    """Return a case ready to be written as code.
+
+    Args:
+        places: names of the parameters, see `kincheck.curves`.
+
+    Raises:
+        KincheckError: the case has a part that the code cannot have, or a place is unknown.
+    """
+    path = case.sweep.path
+    for name, motion in path.motions.items():
+        plain = motion.motion if isinstance(motion, Absolute) else motion
+        if not isinstance(plain, Ramp | Sine):
+            raise KincheckError(
+                f"{case.name}: the driver {name} follows a {type(plain).__name__.lower()}, which"
+                " code cannot have. Give it a ramp or a sine, or sweep it."
+            )
+    measured = tuple(each for each in case.outputs if not each.forces)
+    if not measured:
+        left = shortened([each.name for each in case.outputs], 5)
+        raise KincheckError(
+            f"{case.name}: all outputs are forces ({left}), which the code cannot have. Add an"
+            " output of the motion."
+        )
+    case = replace(case, outputs=measured)
+    parameters: list[Parameter] = []
+    if places:
+        ready = prepare_curves(case, places)
+        varied = [*ready.outputs.designs.route.model.varied]
+        made = DesignOutputs.of(case, varied, derivative=2)
+        slots, geometry = made.designs.route.model.geometry, Geometry(case)
+        for k, (name, unit) in enumerate(ready.units.items()):
+            moves = {slots[i]: float(x) for i, x in enumerate(ready.moves[:, k]) if x}
+            parameters.append(Parameter(name, unit, _nominal(geometry, name), moves))
+    else:
+        made = DesignOutputs.of(case, (), derivative=2)
+    route = made.designs.route
+    if route.begin.lead is not None:
+        raise KincheckError(
+            f"{case.name}: the motion does not begin at the design position. Change the drivers"
+            " so that they have their design values at one time."
+        )
+    model, kept = route.model, len(route.model.slots) + 1
+    outputs: list[CodeOutput] = []
+    for each in measured:
+        outputs.append(found := _output(model, each, kept))
+        kept += 4 if found.completion else 1 if found.period else 0
+    return SolvedCase(case, model, outputs, parameters, route.begin.time)
+
+
+def _nominal(geometry: Geometry, name: str) -> float:
+    """Return the value of a number at design [SI]; an angle of a direction is zero there."""
+    whole, _, axis = name.rpartition(" ")
+    variable = geometry.variable(whole if axis in ("x", "y", "z") and whole else name)
+    place = variable.places[0]
+    value = np.atleast_1d(geometry.values[place])
+    if variable.kind is Kind.DIRECTION:
+        return 0.0
+    column = "xyz".index(axis) if len(value) == 3 else 0
+    return float(variable.moves[place][:, column] @ value)
+
+
+def _output(model: Model, quantity: Quantity, kept: int) -> CodeOutput:
+    names = (f"{OUTPUT}{label} {quantity.name}" for label in QUANTITIES)
+    slots = [model.plan.kept[model.rows[name]] for name in names if name in model.rows]
+    rows = model.rows.get(f"{RESTING}{quantity.name}")
+    resting = () if rows is None else model.plan.kept[rows]
+    if isinstance(quantity, Orientation):
+        return CodeOutput(quantity, slots, kept=kept, completion=_completion(quantity))
+    if quantity.period:
+        at_design = float(getattr(quantity, "at_design", 0.0))
+        return CodeOutput(quantity, slots, period=quantity.period, at_design=at_design, kept=kept)
+    return CodeOutput(quantity, slots, resting)
+
+
+def _completion(quantity: Orientation) -> Program:
+    """Return the program of an attitude: twelve numbers, Euler parameters and two rates, to the
+    three orders of the component. Those of a rotation vector are of half a turn at most.
+    """
+    tape = Tape()
+    e0, *along = (Jet(*(tape.input(4 * order + k) for order in range(3))) for k in range(4))
+    if quantity.unit == "1":
+        found = (e0, *along)[int(quantity.component[1])]
+    else:
+        square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
+        size = sqrt(square)
+        quotient = 2.0 * arctan2(size, e0) / size
+        series = 2.0 + square * (1.0 / 3.0 + square * (3.0 / 20.0 + square * (5.0 / 56.0)))
+        orders = zip(_orders(quotient), _orders(series), strict=True)
+        factor = Jet(*(where_larger(square.x, SMALL, far, near) for far, near in orders))
+        found = factor * along["xyz".index(quantity.component)]
+    return program("complete", tape, dict(enumerate((found.x, found.v, found.a))))
+
+
+def _orders(jet: Jet) -> tuple[Scalar, Scalar, Scalar]:
+    return jet.x, jet.v, jet.a

@@ -1,0 +1,317 @@
+"""Solved cases as code: C, JavaScript and FMUs against the native engine and `kincheck.curves`."""
+
+import ctypes
+import importlib.util
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import kincheck
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import KincheckError
+from kincheck.core.cli.main import main
+from kincheck.core.extensions.code import c, js
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
+CLOSE = 1e-13
+"""Largest difference to native, relative to the largest value: a thousand round-offs."""
+SOME = ("mcpherson_strut", "four_bar", "rssr", "five_bar", "delta_robot")
+ENDS = {"bennett": "its rows become dependent on the way, and only native exchanges them"}
+compiled = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+MOTIONS = ("position", "velocity", "acceleration")
+CRANK = """schema = "kincheck-case/1"
+name = "crank"
+source = "a body on a hinge"
+[bodies.crank]
+[joints.pivot]
+type = "revolute"
+bodies = ["ground", "crank"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+"""
+
+
+def library(folder, name, *flags, compiler="gcc"):
+    """Compile NAME.c, and return its functions by their names without the prefix."""
+    file = folder / f"{name}.so"
+    command = [compiler, *STRICT, *flags, "-o", str(file), f"{name}.c", "-lm"]
+    subprocess.run(command, cwd=folder, check=True)
+    found = ctypes.CDLL(str(file))
+    for function in ("output", "parameter"):
+        getattr(found, f"{name}_{function}").restype = ctypes.c_char_p
+    getattr(found, f"{name}_size").restype = ctypes.c_size_t
+    getattr(found, f"{name}_nominal").restype = ctypes.c_double
+    number, state = ctypes.c_double, ctypes.c_void_p
+    getattr(found, f"{name}_move").argtypes = [state, number, number, state]
+    getattr(found, f"{name}_set").argtypes = [state, ctypes.c_int, number]
+    return lambda function, *args: getattr(found, f"{name}_{function}")(*args)
+
+
+def write(folder, contents):
+    for name, content in contents.items():
+        (folder / name).write_bytes(content)
+
+
+def solve(call, case):
+    """Return the outputs of the code at the samples of a case, shape (n, outputs, 3)."""
+    state = (ctypes.c_double * (call("size") // 8))()
+    out = (ctypes.c_double * (3 * call("outputs")))()
+    found = np.full((len(case.sweep.values), call("outputs"), 3), np.nan)
+    for k in way(case):
+        if k is None:
+            call("start", state)
+            continue
+        if call("move", state, float(case.sweep.values[k]), float(case.sweep.rate), out) == 0:
+            found[k] = np.frombuffer(out).reshape(-1, 3)
+    return found
+
+
+def way(case):
+    """Samples outwards from the start, both ways; None before each."""
+    times = case.sweep.path.times
+    yield None
+    yield from (k for k in np.argsort(times) if times[k] >= 0.0)
+    yield None
+    yield from (k for k in np.argsort(-times) if times[k] < 0.0)
+
+
+def native(case):
+    """Return the same numbers by native; NaN where it has none."""
+    (record,) = kincheck.run(case, "native").records
+    measured = [each.name for each in case.outputs if not each.forces]
+    found = np.full((len(case.sweep.values), len(measured), 3), np.nan)
+    for j, name in enumerate(measured):
+        for order, motion in enumerate(MOTIONS):
+            values = getattr(record.outputs[name], motion)
+            if values is not None:
+                found[:, j, order] = [np.nan if x is None else x for x in values]
+    return found
+
+
+def assert_equal(found, expected):
+    known = np.isfinite(expected)
+    assert known.any()
+    assert np.isfinite(found[known]).all()
+    scale = np.maximum(1.0, np.max(np.abs(expected), axis=0, where=known, initial=0.0))
+    assert np.abs((found - expected) / scale)[known].max() < CLOSE
+
+
+@compiled
+@pytest.mark.parametrize("name", SOME)
+def test_c_of_case_equals_native(name, tmp_path):
+    case = kincheck.load(name)
+    write(tmp_path, c.files(case, ()))
+    assert_equal(solve(library(tmp_path, name, "-O1"), case), native(case))
+
+
+@compiled
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", cases.names())
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("level", ["-O0", "-O2"])
+def test_c_of_every_case(name, compiler, level, tmp_path):
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}")
+    case = kincheck.load(name)
+    write(tmp_path, c.files(case, ()))
+    found = solve(library(tmp_path, name, level, compiler=compiler), case)
+    expected = native(case)
+    if name in ENDS:
+        expected[np.isnan(found)] = np.nan
+    assert_equal(found, expected)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node")
+@pytest.mark.parametrize("name", ["four_bar", "mcpherson_suspension"])
+def test_javascript_of_case_equals_native(name, tmp_path):
+    case = kincheck.load(name)
+    write(tmp_path, js.files(case, ()))
+    steps = [None if k is None else float(case.sweep.values[k]) for k in way(case)]
+    (tmp_path / "run.mjs").write_text(
+        f"""import {{ Mechanism }} from "./{name}.mjs";
+const m = new Mechanism(), out = new Float64Array(3 * m.outputs()), found = [];
+for (const x of {json.dumps(steps)})
+  if (x === null) m.start();
+  else found.push(m.move(x, {case.sweep.rate}, out) ? null : [...out].map((y) => y));
+console.log(JSON.stringify(found));
+"""
+    )
+    said = subprocess.run(
+        ["node", "run.mjs"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    rows = np.array(json.loads(said.stdout), dtype=float)
+    found = np.empty((len(rows), rows.shape[1] // 3, 3))
+    found[[k for k in way(case) if k is not None]] = rows.reshape(len(rows), -1, 3)
+    assert_equal(found, native(case))
+
+
+@compiled
+def test_parameters_equal_curves(tmp_path):
+    table = tmp_path / "car.csv"
+    table.write_text(sample_table(TEMPLATES["double_wishbone"]))
+    case = kincheck.load(table, kincheck.Supplied(travel="30mm:7"))
+    places, moved = ["tierod_inner z", "uca_outer x"], [0.004, -0.003]
+    write(tmp_path, c.files(case, places))
+    call = library(tmp_path, "car", "-O1")
+    assert [call("parameter", k) for k in range(call("parameters"))] == [
+        b"tierod_inner z [m]",
+        b"uca_outer x [m]",
+    ]
+    state = (ctypes.c_double * (call("size") // 8))()
+    out = (ctypes.c_double * (3 * call("outputs")))()
+    call("start", state)
+    for k, change in enumerate(moved):
+        call("set", state, k, call("nominal", k) + change)
+    curves = kincheck.curves(case, places, [moved])
+    for sample, x in enumerate(case.sweep.values):
+        assert call("move", state, float(x), 1.0, out) == 0
+        for j, name in enumerate(each.name for each in case.outputs):
+            expected = curves.values[name][0, sample]
+            assert out[3 * j] == pytest.approx(expected, abs=CLOSE, nan_ok=True)
+
+
+@compiled
+def test_turns_count_and_signs_go_on(tmp_path):
+    """Three turns of a crank, in steps of a third of a turn: by closed form."""
+    text = (
+        CRANK
+        + """[drivers.turn]
+type = "joint_angle"
+joint = "pivot"
+[sweep]
+driver = "turn"
+start = 0.0
+stop = 18.0
+steps = 10
+[outputs.angle]
+type = "joint_angle"
+joint = "pivot"
+[outputs.e3]
+type = "orientation"
+body = "crank"
+component = "e3"
+[outputs.around]
+type = "orientation"
+body = "crank"
+component = "z"
+"""
+    )
+    (tmp_path / "crank.toml").write_text(text)
+    case = kincheck.load(tmp_path / "crank.toml")
+    write(tmp_path, c.files(case, ()))
+    found = solve(library(tmp_path, "crank"), case)
+    turn = case.sweep.values
+    assert found[:, 0, 0] == pytest.approx(turn, abs=CLOSE)
+    assert found[:, 1, 0] == pytest.approx(np.sin(0.5 * turn), abs=CLOSE)
+    assert found[:, 2, 0] == pytest.approx(np.angle(np.exp(1j * turn)), abs=CLOSE)
+    assert found[:, 0, 1] == pytest.approx(1.0, abs=CLOSE)
+
+
+LOCKS = """schema = "kincheck-case/1"
+name = "locks"
+source = "a rod of 1 m from a slide to a crank of 2 m: it locks where they are in line"
+[bodies.crank]
+[bodies.slide]
+[joints.pivot]
+type = "revolute"
+bodies = ["ground", "crank"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[joints.guide]
+type = "translational"
+bodies = ["ground", "slide"]
+point = [0, 0, 0]
+axis = [0, 1, 0]
+[joints.rod]
+type = "distance"
+bodies = ["crank", "slide"]
+points = [[2, 0, 0], [1.2, 0.6, 0]]
+[points.end]
+body = "slide"
+position = [1.2, 0.6, 0]
+[drivers.lift]
+type = "joint_displacement"
+joint = "guide"
+[sweep]
+driver = "lift"
+start = 0.0
+stop = 1.0
+steps = 3
+[outputs.turn]
+type = "joint_angle"
+joint = "pivot"
+"""
+
+
+@compiled
+def test_lock_up_leaves_state_alone(tmp_path):
+    """The slide reaches sqrt(3^2 - 1.2^2) m: beyond, a code and no numbers."""
+    (tmp_path / "locks.toml").write_text(LOCKS)
+    write(tmp_path, c.files(kincheck.load(tmp_path / "locks.toml"), ()))
+    call = library(tmp_path, "locks")
+    state = (ctypes.c_double * (call("size") // 8))()
+    out = (ctypes.c_double * 3)()
+    call("start", state)
+    limit = np.sqrt(9.0 - 1.44) - 0.6
+    assert call("move", state, limit - 1e-3, 1.0, out) == 0
+    before, told = bytes(state), bytes(out)
+    for beyond in (limit + 1e-6, limit + 0.5, 1e6):
+        assert call("move", state, beyond, 1.0, out) == 2
+    assert call("move", state, float("nan"), 1.0, out) == 1
+    assert (bytes(state), bytes(out)) == (before, told)
+    assert call("move", state, 0.0, 1.0, out) == 0
+    assert out[0] == pytest.approx(0.0, abs=CLOSE)
+
+
+@compiled
+@pytest.mark.skipif(importlib.util.find_spec("fmpy") is None, reason="no FMPy")
+@pytest.mark.parametrize("version", ["2", "3"])
+def test_fmu_passes_as_engine(version, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "mcpherson_strut", "--to", "fmu", "--fmi", version, "--out", "."]) == 0
+    validation = importlib.import_module("fmpy.validation")
+    assert validation.validate_fmu("mcpherson_strut.fmu") == []
+    argv = ["run", "mcpherson_strut", "--fmu", "mcpherson_strut.fmu", "--engine", "native"]
+    assert main([*argv, "--json", "found.json"]) == 0
+    *_, record = json.loads(Path("found.json").read_text())["records"]
+    assert (record["engine"], record["outcome"]) == ("mcpherson_strut", "pass")
+    errors = record["errors"]["half_track_change"]
+    assert max(errors[motion]["max_abs"] for motion in MOTIONS) < CLOSE
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        ("four_bar --to c --at 1", "--at: the code starts at the design position"),
+        ("four_bar --to c --fmi 3", "--fmi: only an FMU has a version"),
+        ("four_bar --to mjcf --vary a", "--vary: only code takes it"),
+        ("four_bar --to c --vary nothing", "place 'nothing'"),
+        ("four_bar --to cobol", "there is no format 'cobol'"),
+    ],
+)
+def test_export_of_code_is_refused(argv, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", *argv.split()]) == 2
+    assert said in capsys.readouterr().err
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_code_of_forces_alone_is_refused():
+    case = kincheck.load("mcpherson_strut_loaded")
+    forces = tuple(each for each in case.outputs if each.forces)
+    with pytest.raises(KincheckError, match="all outputs are forces"):
+        c.files(replace(case, outputs=forces), ())
+
+
+def test_code_leaves_forces_out(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "mcpherson_strut_loaded", "--to", "js", "--out", "code"]) == 0
+    said = capsys.readouterr()
+    assert said.out == "code/mcpherson_strut_loaded.mjs\n"
+    assert "the code has no forces" in said.err

@@ -1,0 +1,282 @@
+"""Curves of many designs and their slopes: against runs of each design, and differences of proved
+values.
+"""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import kincheck
+import numpy as np
+import pytest
+from kincheck.adapters import engine
+from kincheck.core import CaseError, KincheckError, PointCoordinate, Supplied
+from kincheck.core.case.measures import Component, JointAngle, JointDisplacement, Orientation
+from kincheck.core.case.models.files import load
+from kincheck.core.case.quantity import with_markers
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+from kincheck.core.extensions.proofs.verified_reference import prove_case
+from kincheck.core.extensions.sweep.varied_places import Geometry
+from kincheck.core.harness.execution import Answer, Pair, attempt
+from kincheck.core.kinematics import placed, places
+
+from ...support.measure_cases import arm
+
+CLOSE = 1e-12
+VEHICLE = {"wheelbase": "2.6", "cg_height": "0.5", "brake_share": "0.6", "rack_per_turn": "0.05"}
+
+
+def table(folder, name, axes="forward,left,up", units="mm", per_mm=1.0):
+    """A template's sample in other axes and units."""
+    ways = dict(zip(("forward", "left", "up"), range(3), strict=True))
+    ways |= {"rearward": ways["forward"], "right": ways["left"], "down": ways["up"]}
+    lines = [f"# template: {name}", f"# units: {units}", f"# axes: {axes}", "name,x,y,z"]
+    for name_of_row, *place in (
+        line.split(",")[:4] for line in sample_table(TEMPLATES[name]).splitlines()[4:]
+    ):
+        along = [
+            (-1.0 if way in ("rearward", "right", "down") else 1.0) * float(place[ways[way]])
+            for way in axes.split(",")
+        ]
+        lines.append(",".join([name_of_row, *(repr(per_mm * x) for x in along)]))
+    file = folder / f"{name}.csv"
+    file.write_text("\n".join(lines) + "\n")
+    return file
+
+
+def numbers_of(case):
+    """Every number of a table, by its name."""
+    return [f"{row.name} {axis}" for row in case.hardpoints if row.moves for axis in "xyz"]
+
+
+def run_alone(case):
+    """All outputs by the native engine and the equations over arrays, drivers held where they are
+    for some.
+    """
+    found = attempt(Pair(case, engine("native"), 1e-12, timed=False)).result
+    assert isinstance(found, Answer), found
+    return {name: series.position for name, series in found.outputs.items()}
+
+
+def assert_equal(found, design, expected):
+    assert {*found.values} == {*expected}
+    for name, values in expected.items():
+        scale = max(1.0, np.nanmax(np.abs(values), initial=0.0))
+        own = found.values[name][design]
+        np.testing.assert_allclose(own, values, rtol=0.0, atol=CLOSE * scale, err_msg=name)
+
+
+FORMS = [
+    ("forward,left,up", "mm", 1.0),
+    ("rearward,down,right", "cm", 0.1),
+    ("up,rearward,left", "m", 1e-3),
+]
+
+
+@pytest.mark.parametrize("form", FORMS, ids=[form[0] for form in FORMS])
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_curves_of_corner_equal_runs(tmp_path, name, form):
+    file = table(tmp_path, name, *form)
+    case = load(file, Supplied(travel="0.03:5", position="front", **VEHICLE))
+    moved = numbers_of(case)
+    offsets = np.random.default_rng(66).normal(size=(2, len(moved))) * 1e-3
+    offsets[0] = 0.0
+    found = kincheck.curves(case, moved, offsets)
+    assert found.solved.all()
+    assert found.reasons == {}
+    for k, row in enumerate(offsets):
+        designs = {
+            each.name: row.reshape(-1, 3)[None, n]
+            for n, each in enumerate(each for each in case.hardpoints if each.moves)
+        }
+        geometry = {place: tuple(value[0]) for place, value in case.geometry(designs).items()}
+        own = replace(case, mechanism=placed(case.mechanism, geometry))
+        assert_equal(found, k, run_alone(own))
+
+
+AXLES = [
+    (name, motion)
+    for name in TEMPLATES
+    for motion in ("heave", "roll", "steer")
+    if TEMPLATES[name].steered or motion != "steer"
+]
+
+
+@pytest.mark.parametrize(("name", "motion"), AXLES)
+def test_curves_of_asymmetric_axle_equal_run(tmp_path, name, motion):
+    """Every place of the case moves by itself, so that left and right differ."""
+    case = load(table(tmp_path, name), Supplied(travel="0.02:5", axle=motion, **VEHICLE))
+    known = places(case.mechanism)
+    own = [
+        f"{place} {axis}"
+        for place, value in known.items()
+        if place.startswith("joints.left") and len(value) == 3 and ".ax" not in place
+        for axis in "xyz"
+    ]
+    plain = replace(case, hardpoints=())
+    geometry = dict.fromkeys(own)
+    offsets = np.random.default_rng(7).normal(size=(1, len(geometry))) * 5e-4
+    found = kincheck.curves(plain, [*geometry], offsets)
+    moved = {place: [*value] for place, value in known.items()}
+    together = Geometry(plain)
+    for number, offset in zip(geometry, offsets[0], strict=True):
+        place, axis = number.split(" ")
+        for each, slopes in together.variable(place).moves.items():
+            moved[each] = moved[each] + slopes[:, "xyz".index(axis)] * offset
+    expected = run_alone(replace(plain, mechanism=placed(plain.mechanism, moved)))
+    assert found.solved.all()
+    assert_equal(found, 0, expected)
+    if motion == "steer":  # straight wheels at design
+        assert "straight" in found.reasons["ackermann"]
+
+
+def proved(case, names, digits):
+    """Values of outputs that are proved to so many digits, shape (outputs, n)."""
+    found, _ = prove_case(case, digits=digits, numbers="double", tol=CLOSE)
+    assert all(found.outputs[name].reason is None for name in names)
+    return np.array([[Fraction(x) for x in found.outputs[name].position] for name in names])
+
+
+PROVED = (
+    *("toe", "camber", "caster", "scrub_radius", "mechanical_trail", "half_track_change"),
+    *("roll_center_height", "anti_dive", "spring_ratio", "toe.per_travel"),
+    "roll_center_height.per_travel",
+)
+
+
+@pytest.mark.parametrize("number", ["tierod_outer z", "uca_outer y"])
+def test_slopes_equal_differences_of_proved_digits(tmp_path, number):
+    """Central differences of values proved to 40 digits, at three steps: what the extrapolation
+    leaves out is of sixth order, (1e-4)^6, and the places are doubles.
+    """
+    case = load(table(tmp_path, "double_wishbone"), Supplied(travel="0.03:3", **VEHICLE))
+    names = [name for name in PROVED if name in {each.name for each in case.outputs}]
+    assert len(names) >= 9
+    case = replace(case, outputs=tuple(each for each in case.outputs if each.name in names))
+    variable = Geometry(case).variable(number[:-2])
+    (axis,) = [k for k, each in enumerate(variable.numbers) if each == number]
+    known, differences = places(case.mechanism), []
+    for step in (2.0**-13, 2.0**-14, 2.0**-15):
+        ends = list[np.ndarray]()
+        for sign in (1.0, -1.0):
+            moved = {
+                place: (np.array(known[place]) + sign * step * slopes[:, axis]).tolist()
+                for place, slopes in variable.moves.items()
+            }
+            ends.append(proved(replace(case, mechanism=placed(case.mechanism, moved)), names, 40))
+        differences.append((ends[0] - ends[1]) / Fraction(2.0 * step))
+    a, b, c = differences
+    once = [(4 * fine - coarse) / 3 for coarse, fine in ((a, b), (b, c))]
+    expected = ((16 * once[1] - once[0]) / 15).astype(float)
+    found = kincheck.curves(case, [number], [[0.0]], slopes=names)
+    for name, values in zip(names, expected, strict=True):
+        own = found.slopes[name][0, :, 0]
+        np.testing.assert_allclose(own, values, rtol=1e-11, atol=1e-11, err_msg=name)
+
+
+ANGLES = (
+    JointAngle("turn_angle", 1e-9, 0.0, "test", joint="hinge"),
+    JointDisplacement("gone", 1e-9, 0.0, "test", joint="bore"),
+    *(
+        Orientation(f"slide_{each}", 1e-9, 0.0, "test", body="slide", component=each)
+        for each in (Component.X, Component.E0, Component.E2)
+    ),
+)
+
+
+def test_slopes_count_turns_and_signs():
+    """Angles of several turns, and Euler parameters that go on through zero: against differences,
+    whose third derivatives leave 1e-9 at this step.
+    """
+    case = arm(np.linspace(0.0, 7.0, 29))
+    case = replace(case, mechanism=with_markers(case.mechanism, ANGLES), outputs=ANGLES)
+    expected = run_alone(case)
+    moved = ["points.B.position x", "joints.hinge.axis y", "joints.bore.axis z"]
+    names = [each.name for each in ANGLES]
+    step = 1e-5
+    ends = kincheck.curves(case, moved, step * np.concatenate([np.eye(3), -np.eye(3)]))
+    found = kincheck.curves(case, moved, np.zeros((1, 3)), slopes=names)
+    assert expected["turn_angle"][-1] == pytest.approx(7.0)
+    assert_equal(found, 0, expected)
+    largest = 0.0
+    for name in names:
+        differences = (ends.values[name][:3] - ends.values[name][3:]) / (2.0 * step)
+        own = found.slopes[name][0].T
+        np.testing.assert_allclose(own, differences, rtol=1e-8, atol=1e-8, err_msg=name)
+        largest = max(largest, np.abs(own).max())
+    assert largest > 0.1
+
+
+@pytest.fixture(scope="module")
+def corner(tmp_path_factory):
+    file = table(tmp_path_factory.mktemp("corner"), "double_wishbone")
+    return load(file, Supplied(travel="0.03:5"))
+
+
+def test_chunks_equal_whole(corner):
+    offsets = np.random.default_rng(1).normal(size=(7, 2)) * 1e-3
+    moved = ["tierod_inner z", "lca_front y"]
+    whole = kincheck.curves(corner, moved, offsets, ["toe"], ["toe"])
+    parts = [*kincheck.curves_by_chunk(corner, moved, np.split(offsets, [3]), ["toe"], ["toe"])]
+    assert [len(each.solved) for each in parts] == [3, 4]
+    np.testing.assert_array_equal(
+        np.concatenate([each.values["toe"] for each in parts]), whole.values["toe"]
+    )
+    np.testing.assert_array_equal(
+        np.concatenate([each.slopes["toe"] for each in parts]), whole.slopes["toe"]
+    )
+    assert whole.units == {"toe": "rad"}
+    assert whole.places == dict.fromkeys(moved, "m")
+
+
+def test_curves_become_tables(corner):
+    found = kincheck.curves(corner, ["tierod_inner z"], [[0.0], [1e-3]], ["toe"], ["toe"])
+    assert str(found) == (
+        "<DesignCurves: stroke -0.03 to 0.03 m, 2 designs of 5 samples, 1 output>"
+    )
+    data = found.dataset()
+    assert data.variables["toe.slopes"].unit == "rad/m"
+    columns = data.table()
+    assert len(columns["toe"]) == 10
+    np.testing.assert_array_equal(
+        columns["toe.slopes.tierod_inner z"], found.slopes["toe"][:, :, 0].ravel()
+    )
+
+
+def test_design_out_of_reach_says_why(corner):
+    """A tie rod beside the wheel's centre, too short for the travel of its outer end."""
+    found = kincheck.curves(corner, ["tierod_inner y"], [[0.0], [0.335]], ["toe"], ["toe"])
+    assert found.solved[0].all()
+    assert not found.solved[1].all()
+    assert found.messages[1]
+    assert np.isnan(found.values["toe"][1][~found.solved[1]]).all()
+    assert np.isnan(found.slopes["toe"][1][~found.solved[1]]).all()
+
+
+WRONG = {
+    "row without an axis": ((["tierod_inner"], [[0.0]]), "'tierod_inner x', y or z"),
+    "no such row": ((["tierod_iner z"], [[0.0]]), "did you mean 'tierod_inner'"),
+    "one name alone": (("tierod_inner z", [[0.0]]), "expected a list of names"),
+    "nothing to vary": (([], [[]]), "names nothing to vary"),
+    "one row": ((["tierod_inner z"], [0.0]), r"shape (1,), expected (designs, 1)"),
+    "not finite": ((["tierod_inner z"], [[np.nan]]), "give finite numbers"),
+    "no such output": ((["tierod_inner z"], [[0.0]], ["tow"]), "there is no output 'tow'"),
+    "no such slope": ((["tierod_inner z"], [[0.0]], ["toe"], ["tow"]), "there is no output 'tow'"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "said"), WRONG.values(), ids=WRONG)
+def test_wrong_arguments_have_one_message(corner, arguments, said):
+    with pytest.raises(KincheckError) as error:
+        kincheck.curves(corner, *arguments)
+    assert said in str(error.value)
+
+
+def test_absolute_driver_of_varied_point(corner):
+    drivers = [
+        replace(each, relative=False) if isinstance(each, PointCoordinate) else each
+        for each in corner.mechanism.drivers
+    ]
+    case = replace(corner, mechanism=replace(corner.mechanism, drivers=drivers))
+    with pytest.raises(CaseError, match="absolute position of a point that varies"):
+        kincheck.curves(case, ["wheel_center z"], [[0.0]])
+    assert kincheck.curves(corner, ["wheel_center z"], [[0.0]], ["toe"]).solved.all()
