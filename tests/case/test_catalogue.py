@@ -268,4 +268,4 @@ def test_schema_command_prints_schema(name, capfdbinary):
 
 def test_unknown_schema_is_refused(capsys):
     assert main.main(["schema", "cases"]) == 2
-    assert "none of case, variation, results, regression" in capsys.readouterr().err
+    assert "none of case, results, regression" in capsys.readouterr().err

@@ -16,7 +16,7 @@ from kincheck.core.harness.record import Outcome, Record
 
 from ..support.case_texts import BASE, INLINE, edited
 
-ENGINES = ("native", "mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody")
+ENGINES = ("native", "mujoco", "pinocchio", "exudyn", "dart", "drake", "simbody")
 WRONG = INLINE.replace("1.4, 2.0", "1.4, 2.1")
 PLAIN = "[project]\nname = 'theirs'\n# schema = 'kincheck-case/1' is said, and this is none\n"
 

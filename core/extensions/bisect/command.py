@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from ...cli.parser import Command
 from ...cli.registry import Registry, Status
 from ...errors import KincheckError, refuse
-from ...harness.engine import STANDARD
 from ...options import CASES, argument, destination, json_file, option, options, positive, switch
 
 if TYPE_CHECKING:
@@ -69,6 +68,7 @@ class Bisect(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
+        from ...harness.engine import STANDARD
         from ...report.sections import deliver
         from ...version import VERSION
         from . import releases
@@ -155,6 +155,7 @@ class Bisect(Command):
 
 
 def _native(registry: Registry, cases: Sequence[Case]) -> Sequence[Record]:
+    from ...harness.engine import STANDARD
     from ...harness.run import run
 
     return run(cases, [registry.engine(STANDARD)], tol=TOL).records
