@@ -40,23 +40,40 @@ def save_table(
             f"save {name!r}: expected a plain name that ends in .csv, of letters, digits, dots,"
             " dashes and blanks; give another"
         )
-    path = table.file.parent / name
+    return write_table(table, supplied, points, table.file.parent / name, f"save {name}")
+
+
+def write_table(
+    table: HardpointTable,
+    supplied: Supplied,
+    points: Sequence[Sequence[float]],
+    path: Path,
+    option: str,
+) -> Path:
+    """Write a table with other numbers to a new CSV file, as `save_table` does.
+
+    Args:
+        option: what the user gave, for messages.
+
+    Raises:
+        KincheckError: the file exists, or cannot be written.
+    """
     content = _text_with_changes(table, points) or _new_text(table, supplied, points)
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
     try:
         with open(os.open(path, flags, 0o644), "w", encoding="utf-8", newline="") as file:
             file.write(content)
     except FileExistsError:
-        raise KincheckError(f"save {name}: the file exists and stays; give another name") from None
+        raise KincheckError(f"{option}: the file exists and stays; give another name") from None
     except OSError as error:
         raise KincheckError(
-            f"save {name}: cannot be written ({error.strerror}); give another name, or start"
+            f"{option}: cannot be written ({error.strerror}); give another name, or start"
             " kincheck with a file in a folder that is writable"
         ) from None
     if not _reads_back(path, supplied, table, points):
         path.unlink()
         raise KincheckError(
-            f"save {name}: the file would be read with other numbers; nothing was written: save"
+            f"{option}: the file would be read with other numbers; nothing was written: save"
             " the table from the program that made it"
         )
     return path
