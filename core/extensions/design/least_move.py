@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-from scipy.optimize import linprog, nnls
+import scipy.optimize  # pyright: ignore[reportMissingTypeStubs]
 
 from ...trajectory import Array
 
@@ -29,6 +29,7 @@ Bands = Callable[[Array], tuple[Array, Array] | None]
 HELD = 1e-7
 """A band is held up to this share of its half-width: the rounding of an ill-conditioned design."""
 ROUNDS = 80
+_optimize: Any = scipy.optimize
 _END = 1e-12
 _LEAST_TRUST = 1e-9
 # A bound that is exceeded weighs at least so much against the norm, which is of size one.
@@ -112,22 +113,20 @@ def _of_linear(u: Array, g: Array, slopes: Array, trust: float) -> tuple[Array, 
     shift, n = g - slopes @ u, len(u)
     rows = np.vstack([slopes, -slopes])
     free = np.concatenate([-1.0 - shift, shift - 1.0])  # rows @ v >= free - t
-    found = cast(
-        Any,
-        linprog(
-            np.r_[np.zeros(n), 1.0],
-            A_ub=-np.column_stack([rows, np.ones(len(rows))]),
-            b_ub=-free,
-            bounds=[*zip(low, high, strict=True), (0.0, None)],
-            method="highs",
-        ),
+    found = _optimize.linprog(
+        np.r_[np.zeros(n), 1.0],
+        A_ub=-np.column_stack([rows, np.ones(len(rows))]),
+        b_ub=-free,
+        bounds=[*zip(low, high, strict=True), (0.0, None)],
+        method="highs",
     )
     least = np.clip(found.x[:n], low, high)
     excess = max(0.0, float((free - rows @ least).max()))
     beyond = excess * (1.0 + 1e-9) + (1e-9 if excess else 0.0)
     every = np.vstack([rows, np.eye(n), -np.eye(n)])
     bounds = np.concatenate([free - beyond, low, -high])
-    weights, _ = nnls(np.vstack([every.T, bounds]), np.r_[np.zeros(n), 1.0], maxiter=50 * len(rows))
+    system, goal = np.vstack([every.T, bounds]), np.r_[np.zeros(n), 1.0]
+    weights: Array = _optimize.nnls(system, goal, maxiter=50 * len(rows))[0]
     rest = np.r_[every.T @ weights, bounds @ weights - 1.0]
     new, worth = least, np.zeros(len(g))
     if abs(rest[n]) > 1e-3 / (2.0 + n):  # else round-off has taken the place of a distance

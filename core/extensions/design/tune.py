@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,9 +25,6 @@ from ..hardpoints.table import Hardpoint, HardpointTable, unit_of
 from ..sweep.curves import curves
 from .goals import Goal, read_goals, read_moves
 from .least_move import HELD, LeastMove, least_move
-
-if TYPE_CHECKING:
-    from .tune_command import Tune
 
 CHECKS = ("mujoco", "pinocchio", "exudyn")
 """Engines that solve the answer again, the first that is installed."""
@@ -169,21 +165,37 @@ class Search:
         return {name: values[0] for name, values in found.values.items()}
 
 
-def tune(options: Tune, case: Case, file: Path, registry: Registry) -> Tuned:
+def tune(
+    case: Case,
+    file: Path,
+    supplied: Supplied,
+    wanted: tuple[Sequence[str], Sequence[str]],
+    starts: int,
+    registry: Registry,
+) -> Tuned:
     """Return the least move that holds all bands, or the nearest miss.
+
+    Args:
+        file: the table of the case, read with `supplied`.
+        wanted: texts of the goals, and of the moves.
+        starts: number of starts of the search.
 
     Raises:
         KincheckError: a goal or move makes no sense, the table does not reach its travel, or
             another engine contradicts the answer.
     """
-    supplied = options.supplied
-    case, goals, notes = read_goals(options.goal, case, supplied)
-    boxes = read_moves(options.move, case)
+    of_goals, of_moves = wanted
+    case, goals, notes = read_goals(of_goals, case, supplied)
+    boxes = read_moves(of_moves, case)
     search = Search(case, goals, boxes)
     before = search.values(np.zeros(len(boxes)))
     random = np.random.default_rng(0)  # the same answer each time
-    starts = [np.zeros(len(boxes)), *random.uniform(-1.0, 1.0, (options.starts - 1, len(boxes)))]
-    found = [end for start in starts if (end := least_move(search, start)) is not None]
+    others = random.uniform(-1.0, 1.0, (starts - 1, len(boxes)))
+    found = [
+        end
+        for start in (np.zeros(len(boxes)), *others)
+        if (end := least_move(search, start)) is not None
+    ]
     best = min(found, key=lambda each: each.order)
 
     table = read_hardpoints(file, supplied)

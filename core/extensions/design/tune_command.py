@@ -69,7 +69,8 @@ class Tune(OfCase):
             raise KincheckError(
                 f"{case.name}: is no table of hardpoints; give a table, such as car.csv"
             )
-        found = tune(self, case, Path(self.case), registry)
+        wanted = self.goal, self.move
+        found = tune(case, Path(self.case), self.supplied, wanted, self.starts, registry)
         if found.reached and self.out is not None:
             write_table(found.table, self.supplied, found.points, self.out, f"--out {self.out}")
         with with_json(_facts(found, self.out), self.json) as console:
