@@ -3,10 +3,13 @@
 import json
 
 import kincheck
+import msgspec
 import numpy as np
 import pytest
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
+from kincheck.core.harness import run as running
+from kincheck.core.harness.record import Outcome
 from scipy.optimize import minimize
 
 DEG = np.pi / 180.0
@@ -186,6 +189,26 @@ def test_tune_follows_measured_curve(car):
 def test_tune_bad_text_is_refused(car, capsys, goal, move, message):
     assert main(["tune", str(car), "--goal", goal, "--move", move]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_tune_contradicted_table_is_refused(car, monkeypatch, capsys):
+    pytest.importorskip("mujoco")
+    honest = running.run
+
+    def contradicting(cases, engines, **how):
+        found = honest(cases, engines, **how)
+        if engines[0].name == "native":
+            return found
+        fail = {"outcome": Outcome.FAIL, "message": "toe is off"}
+        records = [msgspec.structs.replace(each, **fail) for each in found.records]
+        return msgspec.structs.replace(found, records=records)
+
+    monkeypatch.setattr(running, "run", contradicting)
+    new = car.with_name("new.csv")
+    words = ["--goal", GOALS[0], "--move", "tierod_inner: +- 15 mm", "--out", str(new)]
+    assert main(["tune", str(car), *words]) == 2
+    assert "mujoco does not confirm the new table (fail: toe is off)" in capsys.readouterr().err
+    assert not new.exists()
 
 
 def test_tune_locked_travel_is_refused(car, capsys):
