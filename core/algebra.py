@@ -8,10 +8,9 @@ Nothing here compares or branches on a value: a traced scalar has none.
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias, TypeGuard
+from typing import Any, ClassVar, TypeAlias, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +56,8 @@ def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
     if later is not None:
         return later.where_larger(a, b, p, q)
     if is_array(a) or is_array(b):
-        sizes = (np.abs(np.asarray(x, dtype=np.float64)) for x in (a, b))
-        chosen: Scalar = np.where(operator.gt(*sizes), p, q)
-        return chosen
+        first, second = (np.abs(np.asarray(x, dtype=np.float64)) for x in (a, b))
+        return cast("NDArray[Any]", np.where(first > second, p, q))
     return p if abs(a) > abs(b) else q
 
 

@@ -43,6 +43,10 @@ class Extension:
         completions: names that a shell offers as values of each option.
         engines: class of each engine in projection mode.
         simulations: function without arguments that returns each engine in simulate mode.
+        readers: readers of files; see `case.io.readers.Reader`.
+        methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
+        sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
+        sources: options added to commands that run engines; see `cli.engine_source.EngineSource`.
         writers: function that writes a mechanism in each format; see `case.io.model_writer`.
         codes: function that returns the files of a solved case in a language, by their names.
         formats: who reads each format, for the help.
@@ -60,6 +64,10 @@ class Extension:
     completions: _Table = field(default_factory=dict[str, str])
     engines: _Table = field(default_factory=dict[str, str])
     simulations: _Table = field(default_factory=dict[str, str])
+    readers: _Table = field(default_factory=dict[str, str])
+    methods: _Table = field(default_factory=dict[str, str])
+    sections: _Table = field(default_factory=dict[str, str])
+    sources: _Table = field(default_factory=dict[str, str])
     writers: _Table = field(default_factory=dict[str, str])
     codes: _Table = field(default_factory=dict[str, str])
     formats: _Table = field(default_factory=dict[str, str])

@@ -157,3 +157,15 @@ def shortened(texts: Sequence[str], most: int, between: str = ", ") -> str:
     """Return the first `most` texts, and the number of further ones."""
     more = f" and {len(texts) - most} more" if len(texts) > most else ""
     return between.join(texts[:most]) + more
+
+
+WARNING = "warning: "
+"""Begin of a note on input more likely wrong than meant."""
+
+
+def labelled(note: str, case: str = "") -> str:
+    """Return a note on a case for a line of its own, with its kind and the case."""
+    own = f"{case}: " if case else ""
+    if note.startswith(WARNING):
+        return f"{WARNING}{own}{note.removeprefix(WARNING)}"
+    return f"note: {own}{note}"

@@ -54,10 +54,15 @@ def installed_version(extra: str) -> str | None:
     import importlib.metadata  # rarely needed, and slow
 
     try:
-        (name, *_) = (re.split(r"[^\w.-]", each, maxsplit=1)[0] for each in _requirements(extra))
-        return importlib.metadata.version(name)
+        return importlib.metadata.version(distribution_of(extra) or "-")
     except (ValueError, importlib.metadata.PackageNotFoundError):
         return None
+
+
+def distribution_of(extra: str) -> str | None:
+    """Return the name of an extra's first distribution; None if there is no such extra."""
+    first = next(iter(_requirements(extra)), "")
+    return re.split(r"[^\w.-]", first, maxsplit=1)[0] or None
 
 
 def is_extra(name: str) -> bool:

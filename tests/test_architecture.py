@@ -83,43 +83,6 @@ IMPORTS = {
 """Folder of the kernel in core: the folders it imports besides itself, whenever the import runs."""
 
 STILL = """
-core/case/io/case_file.py core/extensions/hardpoints/suspension_section.py
-core/case/io/catalogue.py core/extensions/hardpoints/suspension/__init__.py
-core/case/io/outputs.py core/extensions/hardpoints/suspension/__init__.py
-core/case/io/outputs.py core/extensions/hardpoints/suspension/base.py
-core/case/io/outputs.py core/extensions/hardpoints/suspension_section.py
-core/case/io/reference_curve.py core/extensions/hardpoints/suspension/__init__.py
-core/case/io/schema.py core/extensions/hardpoints/suspension/__init__.py
-core/case/models/files.py core/extensions/adams/read.py
-core/case/models/files.py core/extensions/hardpoints/programs.py
-core/case/models/files.py core/extensions/hardpoints/read.py
-core/case/models/files.py core/extensions/hardpoints/rows.py
-core/case/models/files.py core/extensions/hardpoints/table.py
-core/case/models/files.py core/extensions/hardpoints/tree.py
-core/case/models/files.py core/extensions/trees/case.py
-core/case/models/files.py core/extensions/trees/element.py
-core/case/models/files.py core/extensions/trees/mjcf.py
-core/case/models/files.py core/extensions/trees/osim.py
-core/case/models/files.py core/extensions/trees/sdf.py
-core/case/models/files.py core/extensions/trees/tree.py
-core/case/models/files.py core/extensions/trees/urdf.py
-core/case/models/files.py core/extensions/trees/usd.py
-core/case/models/files.py core/extensions/trees/usd_stage.py
-core/cli/checks.py core/extensions/recorded/engine.py
-core/cli/run.py core/extensions/cluster/distributed.py
-core/cli/run.py core/extensions/laboratory/bench/engines.py
-core/cli/shared_options.py core/extensions/cluster/distributed.py
-core/cli/shared_options.py core/extensions/recorded/engine.py
-core/cli/shared_options.py core/extensions/recorded/fmu.py
-core/cli/shared_options.py core/extensions/recorded/meaning.py
-core/cli/shared_options.py core/extensions/recorded/readers.py
-core/cli/shared_options.py core/extensions/recorded/samples.py
-core/cli/shared_options.py core/extensions/recorded/sweep.py
-core/harness/scene.py core/extensions/hardpoints/suspension/__init__.py
-core/harness/suspects.py core/extensions/hardpoints/suspension/__init__.py
-core/kinematics/motion_solver.py core/extensions/blocks/component_lanes.py
-core/kinematics/motion_solver.py core/extensions/blocks/sparse_lanes.py
-core/kinematics/motion_solver.py core/extensions/blocks/sweep.py
 """
 """Modules of extensions that files of the kernel still import: this list only gets shorter."""
 

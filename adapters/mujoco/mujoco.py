@@ -158,7 +158,7 @@ class MuJoCoModel(TreeModel):
 
     def carry(self, chain: Chain) -> None:
         parent, joint = self.carrier[chain.parent], chain.joint
-        node = self.nodes[parent].add_body()
+        node = self.nodes[parent].add_body(name=str(len(self.nodes)))
         # mass and inertia do not affect kinematics, but must be positive definite
         node.mass, node.inertia, node.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
         self.carrier[chain.child] = len(self.nodes)
@@ -262,9 +262,9 @@ class MuJoCoModel(TreeModel):
         self.d = self.mj.MjData(m)
         for frame in self.frames:
             if frame.handle is not None:
-                frame.handle = int(frame.handle.id)
+                frame.handle = int(m.site(frame.handle.name).id)
         for equality in self.equalities:
-            equality.sites = [int(site.id) for site in equality.sites]
+            equality.sites = [int(m.site(site.name).id) for site in equality.sites]
             self.own.append((ROWS[equality.kind], equality.keeps))
         if self.equalities:
             self.conditions.insert(0, Equalities(self, self.own_count))
@@ -276,7 +276,7 @@ class MuJoCoModel(TreeModel):
         m.body_mass[:] = 0.0
         m.body_inertia[:] = 0.0
         for each in self.masses:
-            body = self.nodes[each.frame.body].id
+            body = m.body(self.nodes[each.frame.body].name).id
             mass, center, inertia = mass_properties(each.body, np.zeros(3))
             principal, axes = np.linalg.eigh(inertia)
             axes[:, 2] *= np.sign(np.linalg.det(axes))
@@ -348,7 +348,7 @@ class MuJoCoModel(TreeModel):
         return found
 
     def passed_on(self, body: int, point: Array) -> Array:
-        node = self.nodes[body].id
+        node = self.m.body(self.nodes[body].name).id
         moment, force = np.split(np.array(self.d.cfrc_int[node]), 2)
         center = np.array(self.d.subtree_com[self.m.body_rootid[node]])
         return np.concatenate([force, moment + np.cross(center - point, force)])

@@ -72,7 +72,7 @@ def write(
     masses, left_out = text.facts(mechanism, model.sprung, frames, "Drake", gravity=False)
     note = NOTE.format(masses, at and f" ({at})", model.loops, zero + left_out)
     add_note(model.root, note)
-    kinds = (["link", "frame", "joint", "drake:ball_constraint"], [STRUT])
+    kinds = (["link", "frame", "joint", "drake:ball_constraint", STRUT],)
     return {".sdf": document(model.root, kinds, reserved=[WORLD])}
 
 
@@ -206,7 +206,7 @@ class _Model:
         if isinstance(force, SpringDamper):
             if not force.free_length:  # Drake refuses it
                 return False
-            element = ET.SubElement(self.model, STRUT, name=force.name)
+            element = ET.SubElement(self.model, STRUT, name=self.spring_name(force.name))
             for tag, content in text.strut(force, self.local).items():
                 add_text(element, tag, content)
             return True
@@ -222,6 +222,13 @@ class _Model:
             add_text(dynamics, "spring_stiffness", force.stiffness)
             return True
         return False
+
+    def spring_name(self, name: str) -> str:
+        """Return the name of a spring, which in SDF differs from those of all others in a model."""
+        taken = {each.attrib.get("name") for each in self.model}
+        while name in taken:
+            name += ".spring"
+        return name
 
     def local(self, link: str, P: Vector) -> Vector:
         """Return a point, global at the start, in the axes of a link [m]."""

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from array import array
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,10 @@ _NUMBER = re.compile(r"[-+]?(\d*)\.?(\d*)(?:[eE]([-+]?\d{1,9}))?")
 EXACT = 15
 # Driver values with fewer digits are those that somebody set.
 FEWEST_OF_DRIVER = 3
+# Numbers of fewer digits are those of which zeros were left out.
+FEWEST_DIGITS = 4
+# Two steps may be equal by chance; of as many whole numbers, a common factor is none.
+FEWEST_STEPS, MANY = 3, 10
 # Differences of an even grid agree to this part of the step; those of rounded numbers do not.
 _EVEN = 1e-9
 
@@ -27,34 +32,32 @@ _EVEN = 1e-9
 class Printed:
     """The digits of a column of numbers, printed with as many decimals, or with as many digits.
 
-    A spreadsheet leaves out the zeros at the end of a number: 0.4 beside 0.412 has three decimals.
-    Of the two formats, the column has the one that leaves out fewer of them.
+    Programs leave out zeros at the end of a number: 0.4 beside 0.412 has three decimals, and 9.7361
+    beside 10.0332 has six digits, or five. A number has as many decimals and digits as the column
+    at most, whichever is coarser.
 
     Attributes:
         significant: most significant digits of a number.
         decimals: most decimals, less the exponent.
-        numbers: how many there are but for zeros, which have no significant digit.
-        all_significant, all_decimals: sums over these.
+        own: decimals of each number, less the exponent.
     """
 
     significant: int = 0
     decimals: int | None = None
-    numbers: int = 0
-    all_significant: int = 0
-    all_decimals: int = 0
+    own: array[int] = field(default_factory=lambda: array("q"))
 
     def add(self, text: str) -> None:
-        """Take a further number of the column."""
-        if self.exact or (found := _NUMBER.fullmatch(text.strip())) is None:
+        """Take a further number of the column; any other text is a gap."""
+        if self.exact:
+            return
+        if (found := _NUMBER.fullmatch(text.strip())) is None:
+            self.own.append(0)
             return
         whole, part, exponent = found.groups()
         decimals = len(part) - int(exponent or 0)
+        self.own.append(decimals)
         self.decimals = decimals if self.decimals is None else max(self.decimals, decimals)
-        if digits := (whole + part).lstrip("0"):
-            self.significant = max(self.significant, len(digits))
-            self.numbers += 1
-            self.all_significant += len(digits)
-            self.all_decimals += decimals
+        self.significant = max(self.significant, len((whole + part).lstrip("0")))
 
     @property
     def exact(self) -> bool:
@@ -66,40 +69,64 @@ class Printed:
         """Whether the numbers have few digits: somebody may have set them."""
         return self.significant < FEWEST_OF_DRIVER
 
-    def half(self, values: Array) -> Array:
+    def half(self, values: Array, *, alone: bool = False) -> Array:
         """Return half a unit of the last digit of each number; zero if they have all digits, or are
         zeros without decimals.
+
+        Args:
+            values: the numbers that were added, and anything at gaps.
+            alone: whether each number counts by itself, since rows may be printed with fewer digits
+                than others: it has the digits that it shows, but four if it shows fewer.
         """
-        places = self.decimals or 0
-        if self.exact or self.decimals is None or (self.numbers == 0 and places <= 1):
+        if self.exact or self.decimals is None or (self.significant == 0 and self.decimals <= 1):
             return np.zeros(values.shape)
-        fixed = np.full(values.shape, float(f"5e{-places - 1}"))  # infinite beyond doubles
-        left_out = self.numbers * places - self.all_decimals
-        if left_out <= self.numbers * self.significant - self.all_significant:
-            return fixed
-        first = np.floor(np.log10(np.where(values == 0.0, 1.0, np.abs(values))))
-        return np.where(values == 0.0, fixed, 0.5 * 10.0 ** (first + 1.0 - self.significant))
+        own, zero = np.array(self.own, dtype=np.float64), values == 0.0
+        with np.errstate(all="ignore"):  # infinite beyond doubles; gaps
+            whole = np.where(zero, -np.inf, np.floor(np.log10(np.abs(values))) + 1.0)
+            column, four = (0.5 * 10.0 ** (whole - n) for n in (self.significant, FEWEST_DIGITS))
+            fixed, shown = 0.5 * 10.0 ** -np.float64(self.decimals), 0.5 * 10.0**-own
+        found = np.maximum(fixed, column)
+        if not alone:
+            return found
+        # a zero with one decimal is written as another without any
+        return np.maximum(found, np.where(zero, shown * (own > 1.0), np.minimum(shown, four)))
 
 
 def is_even_grid(values: Array) -> bool:
-    """Return whether the values are an even grid, which somebody chose and nobody rounded."""
-    return are_even_steps(np.diff(values))
+    """Return whether the steps between values are equal."""
+    return _are_equal(np.diff(values))
 
 
-def are_even_steps(steps: Array) -> bool:
-    """Return whether steps are those of an even grid."""
+def _are_equal(steps: Array) -> bool:
     return len(steps) < 2 or float(np.ptp(steps)) <= _EVEN * float(np.abs(steps).max())
 
 
-def have_common_factor(values: Array, decimals: int) -> bool:
-    """Return whether the values, in units of their last decimal, have a common factor, so that
-    somebody set them.
+def is_set(values: Array, half: Array) -> bool:
+    """Return whether somebody set values of time or a driver, so that they are not rounded: numbers
+    of one or two digits, an even grid, forth or back, or multiples of one number.
+
+    Rounded values may be even too: 5.73, 11.46 and 17.19 are tenths of a radian. So a step of three
+    digits or more must end with 0, 25, 50 or 75.
+
+    Args:
+        half: half a unit of the last digit of each.
     """
-    largest = float(np.abs(values).max())
-    if largest > 0.0 and decimals + math.log10(largest) > EXACT:
+    known, units = values[np.isfinite(values)], 2.0 * half[half > 0.0]
+    if not units.size or float(np.abs(known).max(initial=0.0)) >= 10.0**EXACT * units.min():
         return False
-    units = np.round(values * 10.0**decimals) if largest else values
-    return math.gcd(*map(int, units.tolist())) != 1
+    finest, coarsest = float(units.min()), float(units.max())
+    if float(np.abs(known).max()) <= 100.5 * finest:
+        return True
+    steps = np.abs(np.diff(known))
+    steps = steps[steps > 0.0]
+    if len(steps) >= FEWEST_STEPS and _are_equal(steps):
+        step = round(float(steps[0]) / finest)
+    else:
+        step = math.gcd(*map(int, np.round(known / finest).tolist()))
+        # a factor of units of the last digit is one of those with the fewest decimals
+        if len(known) < MANY or (step and step * finest < 1.5 * coarsest):
+            return False
+    return step < 100 or step % 10 == 0 or step % 25 == 0
 
 
 FEWEST = 4

@@ -186,7 +186,7 @@ class SolvedDesigns:
     def _terms(self, name: str) -> list[Jet]:
         designs, orders = self.ready.designs, range(self.ready.derivatives[name] + 1)
         known = [designs.output(self.found, name, order) for order in orders]
-        unknown = [np.full(known[0].shape, np.nan)] * (ORDERS - len(known))
+        unknown = [np.broadcast_to(np.nan, known[0].shape)] * (ORDERS - len(known))
         return [Jet(*each) for each in zip(*known, *unknown, strict=True)]
 
     def _completed(self, name: str) -> Completion:

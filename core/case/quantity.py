@@ -127,7 +127,7 @@ def where_moving(quotient: Jet, speeds: tuple[Any, Any] | None) -> Jet:
     """
     if speeds is None:
         return quotient
-    own, fastest = (np.asarray(each).astype(np.float64) for each in speeds)
+    own, fastest = (np.asarray(each, dtype=np.float64) for each in speeds)
     limit = np.broadcast_to(STILL**2 * np.fmax.reduce(fastest, axis=0, initial=0.0), own.shape)
     return quotient if (own > limit).all() else known(own, limit, quotient)
 
@@ -212,12 +212,16 @@ class TypedQuantity(PoseQuantity):
         type: name in case files.
         measure: SI unit: m, rad, or 1.
         positive: meaning of a positive value.
+        needs: what is optional in the table of the type, and required here.
+        further: further keys in case files beyond the fields of the class: type and default.
         registry: classes by type.
     """
 
     type: ClassVar[str]
     measure: ClassVar[str]
     positive: ClassVar[str]
+    needs: ClassVar[tuple[str, ...]] = ()
+    further: ClassVar[Mapping[str, tuple[Any, Any]]] = {}
     registry: ClassVar[dict[str, Any]]
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -229,6 +233,11 @@ class TypedQuantity(PoseQuantity):
     def unit(self) -> str:
         """Unit of the type."""
         return self.measure
+
+    @property
+    def side(self) -> str:
+        """Side of the vehicle that it is of, left or right; empty if of none."""
+        return ""
 
     @property
     def sense(self) -> str:
@@ -252,6 +261,35 @@ def own_keys(cls: type[Any]) -> list[Field[Any]]:
     return [
         each for each in fields(cls) if each.name not in common and not each.metadata.get("hidden")
     ]
+
+
+class Derived(PoseQuantity):
+    """A quantity derived from an output, with its tolerance; the reader of a case file adds it."""
+
+
+class Convention(StrEnum):
+    """Standard of the axes and signs of outputs. SAE J670 also allows z up; here its name means the
+    historical z down.
+    """
+
+    ISO_8855 = "iso8855"
+    SAE_J670 = "sae_j670"
+
+    @property
+    def words(self) -> str:
+        """Standard and its axes, in words."""
+        return (
+            "ISO 8855 (x forward, y left, z up)"
+            if self is Convention.ISO_8855
+            else "SAE J670 (x forward, y right, z down)"
+        )
+
+    @property
+    def up(self) -> int:
+        """Factor from an upward component to one along z, and from a leftward component to one
+        along y.
+        """
+        return 1 if self is Convention.ISO_8855 else -1
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from itertools import chain
+from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, refuse
 from ..options import (
@@ -13,6 +14,7 @@ from ..options import (
     verbosity,
     whole,
 )
+from .engine_source import CHECK_ENGINE, names_of, options_for, sources
 from .parser import Command
 from .registry import Registry, Status
 from .shared_options import TOL
@@ -62,10 +64,11 @@ TOPOLOGIES = {
 }
 """Built-in cases by a word on their structure."""
 NAME_ONE = "Name one engine to check: MODULE:CLASS or --engine-command."
+_Added: Any = options_for(CHECK_ENGINE)
 
 
 @options
-class CheckEngine(Command):
+class CheckEngine(_Added):  # pyright: ignore[reportUntypedBaseClass]
     """Check an engine: every joint type, several topologies, its rates against differences, its
     refusals, and repeated answers. Each pair is solved in a worker process.
     """
@@ -77,11 +80,6 @@ class CheckEngine(Command):
         "?",
         default=None,
     )
-    engine_command: str | None = option(
-        'a program as an engine, "prog {case} {samples} {out}"; see run',
-        metavar="COMMAND",
-        default=None,
-    )
     quiet: bool = verbosity("print only the failed checks and the count")
 
     def answer(self, registry: Registry) -> Report:
@@ -90,17 +88,18 @@ class CheckEngine(Command):
         Raises:
             KincheckError: there is no such engine, or a member of the engine protocol is missing.
         """
-        from ..extensions.recorded.engine import ProgramEngine
         from ..harness.engine import STANDARD
         from ..report.progress import progress
         from ..studies.checks.check_engine import check_engine
 
-        if self.engine is not None and self.engine_command is not None:
+        added = sources(CHECK_ENGINE)
+        options = ["engine", *chain.from_iterable(map(names_of, added))]
+        if sum(getattr(self, name) is not None for name in options) != 1:
             raise KincheckError(NAME_ONE)
-        program = self.engine_command
-        engine = ProgramEngine(program) if program is not None else self.engine
         problems = list[str]()
-        found = registry.find_engines([engine], problems)
+        named: list[Any] = [] if self.engine is None else [self.engine]
+        named += chain.from_iterable(source.engines(self, [], problems)[1] for source in added)
+        found = registry.find_engines(named, problems)
         refuse(problems)
         cases = {word: registry.case(name) for word, name in TOPOLOGIES.items()}
         native = registry.engine(STANDARD)
@@ -108,8 +107,6 @@ class CheckEngine(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        if self.engine is None and self.engine_command is None:
-            raise KincheckError(NAME_ONE)
         report = self.answer(registry)
         report.print(sys.stdout, quiet=self.quiet)
         return Status.WITHIN if report.passed else Status.DEVIATES

@@ -35,6 +35,14 @@ def files_of(options: object) -> dict[str, str | Path]:
     return {name: file for name, file in given.items() if isinstance(file, kinds[name])}
 
 
+def not_in_history(options: object, why: object) -> str:
+    """Return a message on a run that its history does not store, and where its results are."""
+    places = [*files_of(options).values(), vars(options).get("out")]
+    kept = [str(each) for each in places if each is not None and str(each) != "-"]
+    where = f"its results are in {' and '.join(kept)}" if kept else "say --out DIR to keep it"
+    return f"{why}; the run is not in the history: {where}"
+
+
 def curves_of(options: object) -> dict[str, Path]:
     """Return the requested files for curves by their kinds."""
     return {kind: Path(file) for kind, file in files_of(options).items() if kind in WRITERS}

@@ -120,7 +120,7 @@ def _print_references(options: List, console: Console) -> None:
             console.print(heading)
             console.print(indent_table(table_without_heads(rows)))
     if options.outputs:
-        console.print(catalogue.ON_OUTPUTS)
+        console.print(*catalogue.on_outputs(), sep="\n")
 
 
 def _keys() -> Iterator[str]:

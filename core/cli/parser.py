@@ -42,6 +42,11 @@ class Parser(argparse.ArgumentParser):
             if name not in known and not any(each.startswith(name) for each in known):
                 self.error(f"there is no option {brief(name)!r}{self._remedy(name)}")
         namespace, others = super().parse_known_args(args, namespace)
+        rest = [each for each in self._get_positional_actions() if each.nargs == "*"]
+        if others and rest:  # argparse takes those before the first option alone
+            more: Any = self._get_values(rest[0], others)
+            setattr(namespace, rest[0].dest, [*getattr(namespace, rest[0].dest), *more])
+            others = []
         if others:
             self.error(f"too many arguments: {' '.join(map(brief, others))}; leave them out")
         return namespace, others

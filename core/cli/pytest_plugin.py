@@ -95,23 +95,31 @@ class CaseFile(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
         """Yield the engines' tests; an invalid file is a collection error with its message."""
         from ..case.io.reader_options import CurveOptions
-        from ..errors import KincheckError
-        from .shared_options import recorded_engines
+        from ..errors import KincheckError, refuse
+        from ..harness.engine import Engine
+        from .engine_source import RUN, sources
+        from .run import Run
 
-        registry = _registry()
+        registry, problems = _registry(), list[str]()
         try:
             case = registry.find_case(str(self.path))
             given: dict[str, Any] = {
                 name: self.config.getoption(f"--kincheck-{name}") for name in RECORDED
             }
             curve = CurveOptions(columns=given["map"], accuracy=given["accuracy"])
-            case, recorded = recorded_engines([*map(Path, given["recorded"])], case, curve)
+            cases, recorded = [case], list[Engine]()
+            if files := given["recorded"]:
+                options: Any = Run(recorded=[*map(Path, files)], curve=curve)
+                for source in sources(RUN):
+                    cases, found = source.engines(options, cases, problems)
+                    recorded += found
+            refuse(problems)
         except KincheckError as error:
             raise self.CollectError(str(error)) from None
         required = _required_engines(self.config)
         for engine in [*registry.find_engines(required or registry.engines, []), *recorded]:
             yield EngineTest.from_parent(  # pyright: ignore[reportUnknownMemberType]
-                self, name=engine.name, case=case, engine=engine, required=bool(required)
+                self, name=engine.name, case=cases[0], engine=engine, required=bool(required)
             )
 
 

@@ -11,7 +11,8 @@ from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..case.io.reader_options import LEFT_OUT, NOTHING, Supplied
+from ..case.io.reader_options import NOTHING, Supplied
+from ..case.io.readers import LEFT_OUT
 from ..errors import MOST_NAMED, KincheckError, SolveError, shortened, unknown
 from ..report.progress import complain
 from .class_loading import WHERE, create_engine, load_engine
@@ -84,7 +85,7 @@ class Registry:
                 or its drivers do not match its degrees of freedom.
         """
         from ..case.case import Case
-        from ..case.models.files import DATASETS, SUFFIXES, load
+        from ..case.models.files import load, reader_of, suffixes
         from ..kinematics import require_driven
 
         if isinstance(name, Case):
@@ -108,8 +109,10 @@ class Registry:
                     " Leave it out."
                 )
             case = self.case(name)
-        elif Path(name).suffix in SUFFIXES or os.sep in name or os.path.exists(name):
+        elif Path(name).suffix in suffixes() or os.sep in name or os.path.exists(name):
             case = load(Path(name), supplied)
+            if supplied.recorded and reader_of(Path(name), supplied).leaves_freedoms:
+                return case  # it says itself what is left to the recording
         else:
             missing = unknown("case", name, known)
             raise KincheckError(
@@ -117,8 +120,7 @@ class Registry:
                 " Case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
                 " .urdf, .sdf, .usd, .osim or .adm"
             )
-        # a dataset says itself which freedoms are left to a recording
-        if not driven or (supplied.recorded and Path(name).suffix.lower() in DATASETS):
+        if not driven:
             return case
         try:
             require_driven(case.mechanism)

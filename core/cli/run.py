@@ -16,7 +16,15 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from ..case.io.escape import visible
 from ..case.io.reader_options import CurveOptions, Supplied
-from ..errors import MOST_NAMED, KincheckError, SolveError, collect_errors, refuse, shortened
+from ..errors import (
+    MOST_NAMED,
+    KincheckError,
+    SolveError,
+    collect_errors,
+    labelled,
+    refuse,
+    shortened,
+)
 from ..harness.interrupts import hold, status_of, words_of
 from ..options import (
     CASES,
@@ -26,6 +34,7 @@ from ..options import (
     joint_types,
     json_file,
     option,
+    option_fields,
     options,
     positive,
     several,
@@ -36,8 +45,9 @@ from ..options import (
 from ..report.progress import complain, explain_no_comparison, missing_requirements, progress
 from . import shared_options
 from .class_loading import WHERE
+from .engine_source import RUN, WorkersError, given, names_of, options_for, sources
 from .registry import Registry, Status, tell_left_out
-from .shared_options import HISTORY, MODE, MODES, TOL, Isolated, WithRecordings, with_references
+from .shared_options import HISTORY, MODE, MODES, TOL, Isolated, with_references
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -67,11 +77,12 @@ class _Plan:
     named: Sequence[str]
 
 
+_Added: Any = options_for(RUN)
 CURVES = "write the curves of all engines and references"
 
 
 @options
-class Run(Isolated, WithRecordings):
+class Run(Isolated, _Added):  # pyright: ignore[reportUntypedBaseClass]
     """Solve every case with every engine, judge each, print a table and write the requested files.
 
     Exit status: 0 all within tolerance, 1 something deviates or ends in an error, a timeout or a
@@ -82,6 +93,7 @@ class Run(Isolated, WithRecordings):
     """
 
     about = "solve cases with engines and judge the results"
+    LAST = (*Isolated.LAST, *(each.name for each, *_ in option_fields(_Added) if not each.init))
     cases: str | Path | Case | Sequence[str | Path | Case] | None = argument(
         CASES, "CASE", "*", default=()
     )
@@ -105,9 +117,6 @@ class Run(Isolated, WithRecordings):
         default=TOL,
     )
     out: Path | None = destination("write results.json and report.html there", Path, "DIR")
-    bench: Path | None = destination(
-        "show the work-precision data of this bench.json in the report", Path
-    )
     json: str | None = json_file()
     csv: Path | None = destination(f"{CURVES} as CSV", Path)
     parquet: Path | None = destination(f"{CURVES} as Parquet", Path)
@@ -186,11 +195,8 @@ class Run(Isolated, WithRecordings):
 
         self = _with_cases(self, registry)
         plan = _plan_run(self, registry)
-        precision: Any = None
-        if self.bench is not None:
-            from ..extensions.laboratory.bench.engines import efforts_in
-
-            precision = efforts_in(self.bench)
+        data: list[Any] = [each.efforts(self) for each in sources(RUN)]
+        precision = next((each for each in data if each is not None), None)
         with delivery.json_only() if self.json == "-" else nullcontext():
             results, problems, keeping, stopped = _solve(self, plan)
         if self.out or self.json or keeping:
@@ -248,29 +254,18 @@ def _plan_run(options: Run, registry: Registry) -> _Plan:
     problems: list[str] = shared_options.contradictions(options)
     if options.resume and options.history is None:
         problems.append(f"--resume needs a history. Give --history FILE, or set {HISTORY}.")
-    if options.bench is not None and options.out is None:
-        problems.append("--bench adds to the report. Give --out DIR.")
     tell: Callable[[Iterable[str]], object] = complain if options.command else list
     unread: dict[str, str] = {}
     cases = _cases(options, registry, unread)
     if options.command:
         tell_left_out(cases)
     unused: list[str] = []
-    recorded: list[Engine] = []
-    if options.recorded and len(cases) != 1:
-        problems.append(
-            f"{options.recorded[0]}: found {len(cases)} cases, expected the one that it records"
-        )
-    elif options.recorded:
-        with collect_errors(problems):
-            cases[0], recorded = shared_options.recorded_engines(
-                options.recorded,
-                cases[0],
-                options.curve,
-                analysis=options.analysis,
-                sheet=options.supplied.sheet,
-            )
-    if not (options.reference or options.recorded or options.fmu):
+    added: list[Engine] = []
+    for source in sources(RUN):
+        problems += source.contradictions(options)
+        cases, found = source.engines(options, cases, problems)
+        added += found
+    if not (options.reference or given(options, "COLUMNS")):
         problems += filter(None, [options.curve.without_curve])
     if options.reference and not problems:
         with collect_errors(problems):
@@ -282,17 +277,13 @@ def _plan_run(options: Run, registry: Registry) -> _Plan:
                 cases = [replace(cases[0], assembly=(*cases[0].assembly, *notes))]
     engines = _engines(options, registry, problems)
     baseline = registry.baseline(engines)
-    if recorded:
+    if given(options, "MOTIONS") and not problems:
         from ..kinematics import degrees_of_freedom
 
         mechanism = cases[0].mechanism
         if degrees_of_freedom(mechanism) > len(mechanism.drivers):  # no engine can solve it
             engines, baseline = [], None
-    if options.fmu and options.jobs == 0:
-        problems.append("--fmu runs foreign machine code in workers alone. Leave out --jobs 0.")
-    with collect_errors(problems):
-        foreign = shared_options.foreign_engines(options, cases, options.curve.columns)
-        engines += [*foreign, *recorded]
+    engines += added
     keys = Counter((engine.name, engine.mode) for engine in engines)
     twice = [name for (name, _), count in keys.items() if count > 1]
     problems += [f"engine {name}: found twice; rename one" for name in twice[:1]]
@@ -319,7 +310,6 @@ def _solve(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | Non
     """Return the results, the problems, the run in the history, and the status if a signal stopped
     the run early.
     """
-    from ..extensions.cluster.distributed import ClusterError
     from ..harness import run as running
 
     solver, settings = shared_options.solver(options, plan.engines)
@@ -355,7 +345,7 @@ def _solve(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | Non
         # after a signal between the last record and this line, all records are kept below
         hold()
         return results, problems, keeping, None
-    except (KeyboardInterrupt, ClusterError) as reason:
+    except (KeyboardInterrupt, WorkersError) as reason:
         pairs = running.plan_pairs(plan.cases, plan.engines, unread)
         records.sort(key=lambda each: pairs.index(each.pair))
         why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
@@ -381,7 +371,7 @@ def _explanations(cases: Sequence[Case]) -> Iterator[str]:
             yield from explain(case)
         except SolveError as error:  # only this case fails: its records have the message too
             yield f"{case.name}: cannot be solved: {error}"
-        yield from (f"  note: {note}" for note in notes(case))
+        yield from (f"  {labelled(note)}" for note in notes(case))
 
 
 def _with_cases(options: Run, registry: Registry) -> Run:
@@ -419,7 +409,7 @@ def _cases(options: Run, registry: Registry, unread: dict[str, str]) -> list[Cas
         )
     named = several(options.cases) or ([] if options.joints else registry.cases())
     found = [*probes()] if options.joints else []
-    supplied = replace(options.supplied, recorded=bool(options.recorded))
+    supplied = replace(options.supplied, recorded=given(options, "MOTIONS"))
     if options.command:
         cases = registry.find_cases([*map(str, named)], unread, found, supplied)
     else:
@@ -450,11 +440,11 @@ def selection(options: Any) -> dict[str, Any]:
     """Return the task of a run, as `Results.run["selection"]`: cases, engines, and the given
     options of solution and judgement.
     """
-    run = ("joints", "joint_type", "mode", "reference", "require", "static", "reactions")
-    run += ("recorded", "engine_command", "fmu", "analysis")
+    run = ["joints", "joint_type", "mode", "reference", "require", "static", "reactions"]
+    run += [name for source in sources(RUN) for name in names_of(source)]
     parts: dict[str, dict[str, Any]] = {
         "run": {name: getattr(options, name) for name in run} | {"tol": options.tol},
-        "files": vars(options.supplied) | {"recorded": bool(options.recorded)},
+        "files": vars(options.supplied) | {"recorded": given(options, "MOTIONS")},
         "curve": vars(options.curve),
     }
     return {
@@ -505,7 +495,9 @@ def _open_history(
             return None, [f"{names}: {why}; the run is not in the history"]
         found = keep(Path(options.history), cases, engines, **about)
     except HistoryError as error:
-        return None, [f"{error}; the run is not in the history"]
+        from .destinations import not_in_history
+
+        return None, [not_in_history(options, error)]
     if options.resume:
         print(
             f"kincheck: run {found.run} is resumed after {len(found.made)} records"

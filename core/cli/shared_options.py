@@ -17,10 +17,12 @@ from ..options import (
     group,
     joint_types,
     option,
+    option_fields,
     options,
     positive,
     whole,
 )
+from .engine_source import WORKERS, options_for, sources
 from .parser import Command
 
 if TYPE_CHECKING:
@@ -42,11 +44,6 @@ MODE = "mode of the engines; default: projection, or simulate if an engine has o
 HISTORY = "KINCHECK_HISTORY"
 """Environment variable: the history file if --history is not given."""
 
-SCHEDULER = (
-    "solve on the workers of this dask.distributed scheduler instead; it exchanges pickles: whoever"
-    " runs or reaches it runs code as you, here and on the workers"
-)
-
 
 @options
 class OfCase(Command):
@@ -59,6 +56,7 @@ class OfCase(Command):
 
 
 ISOLATION = "isolation"
+_Workers: Any = options_for(WORKERS)
 
 
 def limit(text: str) -> float:
@@ -70,8 +68,10 @@ def limit(text: str) -> float:
 
 
 @options
-class Isolated(Command):
+class Isolated(_Workers):  # pyright: ignore[reportUntypedBaseClass]
     """A command for pairs of case and engine, each solved in a worker process."""
+
+    LAST = tuple(each.name for each, *_ in option_fields(_Workers))
 
     HEADINGS: ClassVar[Mapping[str, str]] = {
         ISOLATION: "Each case is solved with each engine in a worker process."
@@ -100,16 +100,11 @@ class Isolated(Command):
         heading=ISOLATION,
         default=None,
     )
-    scheduler: str | None = option(SCHEDULER, metavar="ADDRESS", heading=ISOLATION, default=None)
 
 
 def contradictions(options: Isolated) -> list[str]:
     """Return the contradictions between the options."""
-    problems: list[str] = []
-    if options.scheduler is not None and options.jobs is not None:
-        problems.append(
-            "--scheduler: the cluster decides how many pairs run at a time. Leave out --jobs."
-        )
+    problems = [line for each in sources(WORKERS) for line in each.contradictions(options)]
     if options.jobs == 0 and (options.timeout or options.memory):
         problems.append(
             "--jobs 0 solves in this process, which cannot be limited. Leave out --timeout and"
@@ -119,29 +114,21 @@ def contradictions(options: Isolated) -> list[str]:
 
 
 def unreachable(options: Any) -> list[str]:
-    """Return why the requested cluster cannot be reached. This takes time, so it is the last check
+    """Return why requested workers cannot be reached. This takes time, so it is the last check
     before the work.
     """
-    if options.scheduler is None:
-        return []
-    from ..extensions.cluster.distributed import ClusterError, connect_client, load_distributed
-
-    try:
-        with connect_client(load_distributed(), options.scheduler):
-            return []
-    except ClusterError as error:
-        return [str(error)]
+    return [line for each in sources(WORKERS) for line in each.unreachable(options)]
 
 
 def solver(options: Isolated, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
     """Return the solver of the pairs, and its settings for the results."""
-    from ..extensions.cluster.distributed import on_cluster
     from ..harness.workers.pool import solver_for
 
     limits = Limits(options.timeout or TIMEOUT, options.memory or MEMORY)
     limited = {"timeout": limits.timeout, "memory_gb": limits.memory}
-    if options.scheduler is not None:
-        return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler, **limited}
+    for source in sources(WORKERS):
+        if elsewhere := source.solver(options, limits):
+            return elsewhere[0], elsewhere[1] | limited
     wanted = limits if options.timeout or options.memory else None
     found, jobs = solver_for(engines, options.jobs, wanted)
     if jobs:
@@ -152,10 +139,14 @@ def solver(options: Isolated, engines: Sequence[Engine]) -> tuple[Solver, dict[s
 
 
 def return_cases(cases: Sequence[T], supplied: Supplied) -> tuple[list[T | str], Supplied]:
-    """Return cases and facts with the files of --hold, --start and --without among the cases: these
-    options take several names, and in `run --hold knee hip model.xml` also the file.
+    """Return cases and facts with the files among the names of options such as --hold among the
+    cases: these take several names, and in `run --hold knee hip model.xml` also the file.
     """
-    given = {name: getattr(supplied, name) for name in ("hold", "start", "without")}
+    given = {
+        each.name: getattr(supplied, each.name)
+        for each, meaning, _ in option_fields(type(supplied))
+        if meaning and meaning.action == "extend"
+    }
     files = [name for each in given.values() for name in each if os.path.isfile(name)]
     left = {
         option: tuple(name for name in each if name not in files) for option, each in given.items()
@@ -211,122 +202,3 @@ def with_references(
         return with_proved_references(cases, proved, unused), []
     case, notes = with_curve(cases[0], curves[0], curve)
     return [case], notes
-
-
-RECORDINGS = "recordings"
-
-
-@options
-class WithRecordings(Command):
-    """A command that judges results of other programs."""
-
-    HEADINGS: ClassVar[Mapping[str, str]] = {
-        RECORDINGS: "Results of other programs, beside the engines. --map and --accuracy say more."
-    }
-    recorded: Sequence[Path] = option(
-        "results of the case as an engine with the file's name: a table, results of Adams"
-        " (.res) or OpenSim (.mot, .sto), a MAT-file (.mat)",
-        Path,
-        "FILE",
-        several="repeated",
-        heading=RECORDINGS,
-        default=(),
-    )
-    engine_command: Sequence[str] = option(
-        'a program as an engine: "prog {case} {samples} {out}" reads the case (TOML) and its'
-        " samples (CSV), and writes outputs or poses (CSV)",
-        metavar="COMMAND",
-        several="repeated",
-        heading=RECORDINGS,
-        default=(),
-    )
-    fmu: Sequence[Path] = option(
-        "a functional mock-up unit (FMI 2 or 3) as an engine; --map VARIABLE=NAME says which"
-        " variables are drivers and outputs of the case",
-        Path,
-        "FILE",
-        several="repeated",
-        heading=RECORDINGS,
-        default=(),
-    )
-    analysis: str | None = option(
-        "one of several analyses of results of Adams",
-        metavar="NAME",
-        heading=RECORDINGS,
-        default=None,
-    )
-
-
-def foreign_engines(
-    options: WithRecordings, cases: Sequence[Case], columns: Sequence[str]
-) -> list[Engine]:
-    """Return the programs of --engine-command and the FMUs of --fmu as engines.
-
-    Raises:
-        KincheckError: a command has another form, or an FMU cannot run.
-    """
-    if not (options.engine_command or options.fmu):
-        return []
-    from ..extensions.recorded.engine import ProgramEngine
-    from ..extensions.recorded.fmu import read_fmu
-
-    if options.fmu and len(cases) != 1:
-        raise KincheckError(
-            f"{options.fmu[0]}: found {len(cases)} cases, expected the one of the FMU. Name one."
-        )
-    return [
-        *(ProgramEngine(command) for command in options.engine_command),
-        *(read_fmu(file, cases[0], columns) for file in options.fmu),
-    ]
-
-
-def recorded_engines(
-    files: Sequence[Path],
-    case: Case,
-    curve: CurveOptions,
-    *,
-    analysis: str | None = None,
-    sheet: str | None = None,
-) -> tuple[Case, list[Engine]]:
-    """Return the case at the samples of its recordings, and the recordings as engines.
-
-    Args:
-        curve: meaning and accuracy of the columns.
-        analysis: one of several in results of Adams.
-        sheet: of a workbook.
-
-    Raises:
-        KincheckError: a recording cannot be read, or two have different samples.
-    """
-    import numpy as np
-
-    from ..extensions.recorded.engine import RecordedEngine
-    from ..extensions.recorded.meaning import Meaning, Reader, read_accuracy
-    from ..extensions.recorded.readers import Head, read_recording
-    from ..extensions.recorded.samples import samples_of
-    from ..extensions.recorded.sweep import at_samples
-
-    engines: list[Engine] = []
-    found: Case | None = None
-    for file in files:
-        meanings: list[Meaning] = []
-
-        def choose(
-            heads: Sequence[Head], file: Path = file, meanings: list[Meaning] = meanings
-        ) -> list[int]:
-            meanings.append(Reader(file, case, heads).read(curve.columns))
-            return sorted({use.column for use in meanings[-1].uses})
-
-        recording = read_recording(file, choose, analysis=analysis, sheet=sheet)
-        samples = samples_of(case, recording, meanings[-1])
-        accuracy = read_accuracy(file, case, curve.accuracy)
-        resampled = at_samples(case, samples)
-        values = resampled.case.sweep.values
-        if found is not None and not np.array_equal(values, found.sweep.values):
-            raise KincheckError(
-                f"{file}: found other samples than those of {files[0]}. Run recordings"
-                " with different samples one by one."
-            )
-        found = found or resampled.case
-        engines.append(RecordedEngine(file.stem, samples, resampled, accuracy))
-    return found or case, engines

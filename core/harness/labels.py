@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
+import msgspec
+
 from ..case.case import PER_TRAVEL, Truth
 from ..errors import number_of, shortened
 from ..trajectory import PER_TIME, QUANTITIES
@@ -76,6 +78,44 @@ def unsound(record: Record) -> str:
     if not Truth(record.truth).validates or record.evidence is None or record.evidence.sound:
         return ""
     return "kincheck's own" if record.evidence.own else "uncited"
+
+
+def account(record: Record) -> str:
+    """Return the facts of a record beside its errors: what was solved and how well, the reasons for
+    what is not known, times, and its reference.
+    """
+    numbers = {
+        "residual": record.residual_max,
+        "rank": record.rank,
+        "dof": record.dof,
+        "iterations": record.iterations,
+        "us/sample": record.us_per_step,
+    }
+    said = [f"{record.version or 'unknown version'}, {record.mode}, loop: {record.loop}"]
+    said += [f"{record.solved} of {record.samples} samples"] * (record.samples is not None)
+    said += [f"{name} {number(value)}" for name, value in numbers.items() if value is not None]
+    said += [f"no {key}: {reason}" for key, reason in record.reasons.items()]
+    if record.seconds is not None:
+        times = msgspec.structs.asdict(record.seconds).items()
+        said += [f"{name} {number(value)} s" for name, value in times if value is not None]
+    if (own := record.evidence) is not None:
+        given = own.citation, own.signs, own.grid, *own.limits.values()
+        said += [
+            f"reference {', '.join(filter(None, given)) or 'uncited'} ({own.of} {own.sha256[:12]})"
+        ]
+    return "; ".join(said)
+
+
+def unmade(results: Results) -> str:
+    """Return the planned pairs without a record whose cases can be read; empty if there are
+    none.
+    """
+    names = [
+        f"{case} · {product(engine, mode)}"
+        for case, engine, mode in results.missing
+        if case not in results.unread
+    ]
+    return f"{UNMADE}: {shorten_names(names)}" if names else ""
 
 
 def unread(run: Mapping[str, Any]) -> str:

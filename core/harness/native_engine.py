@@ -13,7 +13,7 @@ from ..case.case import Balance, Case
 from ..failures import FailureKind
 from ..forces import Forces
 from ..kinematics import LAST_ITERATION, NativeSolver, ProgramSize, Solver, Style
-from ..program.llvm.compiler import available
+from ..program.llvm.machine_code import available
 from ..trajectory import PointMotion, Trajectory, shown
 from ..version import VERSION
 from .engine import STANDARD

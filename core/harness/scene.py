@@ -10,9 +10,9 @@ import msgspec
 import numpy as np
 
 from ..case.case import MARKER, Case
+from ..case.io.sections import sections
 from ..case.measures import DriverEffort, JointForce
 from ..errors import KincheckError
-from ..extensions.hardpoints.suspension import MotionRatio, SuspensionOutput
 from ..joints import Kind
 from ..joints.base import unit
 from ..kinematics import NativeSolver
@@ -29,7 +29,6 @@ from .scene_record import (
     SceneJoint,
     ScenePoint,
     SceneSpring,
-    SceneWheel,
 )
 
 FRAMES = 61  # a few seconds of animation, and a few kilobytes a body
@@ -119,7 +118,7 @@ def scene(case: Case, *, poses: bool = True, requested: bool = True) -> Scene:
             for point in mechanism.points
             if not point.name.startswith(MARKER)
         ],
-        wheels=_wheels(case),
+        wheels=[wheel for each in sections() for wheel in each.wheels(case).values()],
         springs=_springs(case),
         forces=_forces(case),
         frames=frames,
@@ -127,30 +126,8 @@ def scene(case: Case, *, poses: bool = True, requested: bool = True) -> Scene:
     )
 
 
-def _wheels(case: Case) -> list[SceneWheel]:
-    """Return the wheels of suspension outputs; those without a radius cannot be drawn."""
-    outputs = [each for each in case.outputs if isinstance(each, SuspensionOutput)]
-    found: dict[str, SceneWheel] = {}
-    for vehicle in (vehicle for output in outputs for vehicle in output.vehicles):
-        if (radius := vehicle.radius(case.mechanism)) is not None:
-            center = case.mechanism.point(vehicle.wheel_center)
-            moved = {case.sweep.driver, *case.sweep.motions}
-            alone = not vehicle.travel or moved <= {*vehicle.travel}
-            two = len(vehicle.kingpin or ()) == len(vehicle.kingpin_points) == 2
-            found[center.name] = SceneWheel(
-                body=center.body,
-                center=list(center.position),
-                spin=[float(x) for x in vehicle.spin(case.mechanism)],
-                up=list(vehicle.up),
-                radius=radius,
-                kingpin=[*vehicle.kingpin_points] if two else [],
-                middle=[*vehicle.middle] if alone else [],
-            )
-    return list(found.values())
-
-
 def _springs(case: Case) -> list[SceneSpring]:
-    """Return the springs and dampers among the force elements, and those of motion ratios."""
+    """Return the springs and dampers among the force elements, and those of outputs."""
 
     def named(spring: object, damper: object) -> str:
         return "both" if spring and damper else "damper" if damper else "spring"
@@ -160,11 +137,9 @@ def _springs(case: Case) -> list[SceneSpring]:
         for each in case.mechanism.forces
         if isinstance(each, SpringDamper)
     }
-    for output in case.outputs:
-        if isinstance(output, MotionRatio):
-            a, b = (case.mechanism.point(name) for name in output.between)
-            kind = named(None, "damper" in output.name)
-            found.setdefault((a.position, b.position), (kind, (a.body, b.body)))
+    for section in sections():
+        for points, bodies, damper in section.springs(case):
+            found.setdefault(points, (named(not damper, damper), bodies))
     return [
         SceneSpring(kind=kind, bodies=[*bodies], points=[[*point] for point in points])
         for points, (kind, bodies) in found.items()

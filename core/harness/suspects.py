@@ -7,16 +7,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from itertools import combinations
+from itertools import chain, combinations
 from typing import TypeAlias
 
 import numpy as np
 
 from ..case.case import TIME, Case, Series, pace
+from ..case.io.sections import sections
 from ..case.units import ANGLES, LENGTHS, SECOND, Unit
 from ..errors import shortened
-from ..extensions.hardpoints.suspension import Camber, Toe, camber_of_front_view
 from ..trajectory import QUANTITIES, Array
 from ..unit_text import motion_word, value_text
 from .compare import Curve, as_array, curve_of, deviation
@@ -340,19 +339,10 @@ def _explain(
 
 
 def _definitions(case: Case, off: _Off, others: Mapping[str, Curve]) -> list[NamedChange]:
-    """Return the changes from other definitions of an output: for camber, if toe is known."""
-    camber = next(output for output in case.outputs if output.name == off.output)
-    if not isinstance(camber, Camber) or off.order:
-        return []
-    return [
-        (
-            f"taken as the camber seen from the front, with tan(seen) cos({toe.name}) ="
-            f" tan({camber.name}),",
-            partial(camber_of_front_view, toe=others[toe.name].values),
-        )
-        for toe in case.outputs
-        if isinstance(toe, Toe) and toe.vehicle == camber.vehicle and toe.name in others
-    ]
+    """Return the changes from other definitions of an output, by the extension of its type."""
+    values = {name: curve.values for name, curve in others.items()}
+    found = (each.definitions(case, off.output, values) for each in sections())
+    return [] if off.order else [*chain.from_iterable(found)]
 
 
 def _explanation(

@@ -328,7 +328,7 @@ def keep(
             makes another run.
 
     Raises:
-        HistoryError: the file cannot be read or written.
+        HistoryError: the file is damaged, or cannot be read or written.
     """
     started = datetime.now(UTC)
     facts = circumstances(cases, started=started, tol=tol, command=command) | plain(
@@ -350,6 +350,7 @@ def keep(
     identity = digest(cases, plan, tol, limits, code, machine)
     store = Store(path)
     try:
+        store.require_sound(NIGHTS)
         if resume:
             with store.sparing():
                 earlier = store.resume_run(identity)

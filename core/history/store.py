@@ -119,6 +119,26 @@ class Store:
         with suppress(sqlite3.Error):
             self.connection.close()
 
+    def require_sound(self, latest: int) -> None:
+        """Refuse a file whose structure is damaged, before anything is written into it. Runs with
+        damaged records are passed over.
+
+        Args:
+            latest: number of runs whose records are checked, as a report reads them.
+        """
+        with self.explained("written"):
+            (found,) = self.connection.execute("PRAGMA quick_check(1)").fetchone()
+        if found != "ok":
+            why = found.splitlines()[-1]
+            raise HistoryError(
+                f"history {self.path}: cannot be written: it is damaged ({why}); restore a copy"
+            )
+        for row in self.runs()[:latest]:
+            with self.sparing(), self.explained("read", row.id):
+                query = "SELECT record FROM records WHERE run_id = ?"
+                for (record,) in self.connection.execute(query, (row.id,)):
+                    zlib.decompress(record)
+
     def begin_run(
         self,
         identity: str,

@@ -21,9 +21,8 @@ check_engine = function("check_engine", CheckEngine)
 def offered(name: str) -> Any:
     """Return what an extension offers under a name; of a command, its function."""
     found: Any = offers("public")[name].load()
-    return (
-        function(name, found) if isinstance(found, type) and issubclass(found, Command) else found
-    )
+    whole: Any = isinstance(found, type) and issubclass(found, Command)
+    return function(name, found) if whole else found
 
 
 def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:

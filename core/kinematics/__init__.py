@@ -74,8 +74,8 @@ if TYPE_CHECKING:
     from .formulation.cartesian import COLUMNS, Cartesian
     from .formulation.constraints import Frames, Relation, Style, constraints, unit_near
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
-    from .motion_solver import Solver
-    from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
+    from .motion_solver import Method, Solver
+    from .native_solver import NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import solve
     from .replay import (
         TURN,
@@ -111,8 +111,8 @@ _NAMES = {
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
     "formulation.parameters": "LoadPlace kinds load_places placed places",
-    "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
-    "motion_solver": "Solver",
+    "native_solver": "NativeSolver PreparedDesigns ProgramSize",
+    "motion_solver": "Method Solver",
     "one_design": "solve",
     "replay": (
         "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces"

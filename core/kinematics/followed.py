@@ -56,7 +56,7 @@ class Followed(Protocol):
     def at_design(self) -> Array: ...
 
     def bodies(self, mechanism: Mechanism) -> tuple[str, ...]:
-        """Return the names of the bodies it reads, of those that move."""
+        """Return the names of the bodies it reads, of moving ones."""
         ...
 
     def count_turns(

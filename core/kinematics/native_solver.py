@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,20 +21,11 @@ from .continuation.walk import marcher
 from .design_batch import RECYCLED, Variants, slopes_of, solve_variants
 from .forces.wanted import WantedForces, wanted_forces
 from .formulation.constraints import Style
-from .motion_solver import Solver, by_blocks
+from .motion_solver import Method, Solver, by_method
 from .one_design import by_motion, by_program, motion_only, prepare, start_notes
 
 if TYPE_CHECKING:
     from .design_forces import ForcesOfDesigns
-
-
-class Method(StrEnum):
-    """The system of equations solved at once; the solutions are the same to round-off."""
-
-    BY_SIZE = "by size"
-    ONE_PROGRAM = "one program"
-    BY_COMPONENTS = "component by component"
-    SPARSE = "one sparse system"
 
 
 @dataclass(frozen=True)
@@ -87,9 +77,12 @@ class NativeSolver:
             return by_program(
                 mechanism, request, path, lambda each: Route(compile_model(mechanism, each), path)
             )
-        by_components = self.method is Method.BY_COMPONENTS
-        make = by_blocks(mechanism, motion_only(mechanism, request), by_components=by_components)
-        return by_motion(mechanism, request, path, make(path))
+        if (make := by_method(self.method)) is None:
+            raise SolveError(
+                f"no extension solves {self.method.value}. Leave out the method, or install blocks."
+            )
+        motion = make(mechanism, motion_only(mechanism, request))(path)
+        return by_motion(mechanism, request, path, motion)
 
     def prepare_designs(
         self,
@@ -248,7 +241,7 @@ class PreparedDesigns:
 
     Attributes:
         route: the path made ready for the compiled model.
-        wanted: the forces that are wanted; None without any.
+        wanted: the wanted forces; None without any.
     """
 
     route: Route
@@ -292,7 +285,7 @@ class PreparedDesigns:
         return [found.kept[rows[f"{label} {point}"]] for label in QUANTITIES[:orders]]
 
     def pose(self, found: Variants, body: str) -> Array:
-        """Return origin [m] and Euler parameters of a body that was asked for, shape (7, n, V)."""
+        """Return origin [m] and Euler parameters of a requested body, shape (7, n, V)."""
         rows = self.route.model.rows
         return np.concatenate([found.kept[rows[f"{each} {body}"]] for each in "rp"])
 
@@ -301,8 +294,8 @@ class PreparedDesigns:
         return found.kept[self.route.model.rows[f"{OUTPUT}{QUANTITIES[derivative]} {name}"]]
 
     def resting(self, found: Variants, name: str) -> tuple[Array, Array] | None:
-        """Return squares of the speeds of an output that has no value at rest, shape (n, V);
-        None for any other output.
+        """Return squares of the speeds of an output without a value at rest, shape (n, V); None for
+        any other output.
         """
         rows = self.route.model.rows.get(f"{RESTING}{name}")
         return None if rows is None else (found.kept[rows][0], found.kept[rows][1])
@@ -312,7 +305,7 @@ class PreparedDesigns:
         held, shape (motions, terms, n, V); NaN at samples not reached.
 
         Args:
-            found: what `solve` returns for the geometry.
+            found: result of `solve` for the geometry.
             towards: motions of the varied numbers, shape (numbers, motions).
         """
         return slopes_of(self.route, found, geometry, towards)
@@ -321,7 +314,7 @@ class PreparedDesigns:
         """Return the forces of solved designs; None where none are wanted.
 
         Args:
-            found: what `solve` returns for the geometry.
+            found: the result of `solve` for the geometry.
         """
         if self.wanted is None:
             return None

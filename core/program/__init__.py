@@ -26,6 +26,7 @@ From a plan to machine code:
 - `llvm.fixed_order`: sparse LU factors of several matrices at once, as loops over lists of places.
 - `llvm.compiler`: compile the text, link the object file, and load it.
 - `llvm.jit`: choose cached code, interpretation or compilation for a plan.
+- `llvm.machine_code`: whether llvmlite does all this here; numpy takes over where it does not.
 - `disk_cache`: keep machine code, tables and traced programs on disk.
 
 A mechanism's program is described once, in `core.kinematics.compiled`: `Tracing` names the slots of

@@ -342,8 +342,7 @@ def jacobian(
 
     Args:
         smooth: "abs", "min", "max" and "where" are parts of smooth functions, such as the pieces of
-            a curve; at the kink itself, where they need a derivative of one side, it is that of the
-            second operand.
+            a curve; at the kink itself the derivative is the one of the second operand.
 
     Raises:
         TypeError: a value depends on an input through an operation with a kink ("abs", "min",
@@ -363,7 +362,7 @@ def changes(
     derivatives; see `jacobian`.
 
     Args:
-        inputs: operations of any kind; what they are made of is not looked at.
+        inputs: operations of any kind; their operands are not looked at.
     """
     gradients = {each.number: gradient for each, gradient in inputs.items()}
     for number in _live(tape, values, gradients):
@@ -386,7 +385,7 @@ def changes(
 
 
 def _live(tape: Tape, values: Sequence[Scalar], given: Collection[int] = ()) -> list[int]:
-    """Return the numbers of the operations that values need, in order; none behind given ones."""
+    """Return the numbers of the operations needed for values, in order; none behind given ones."""
     waiting = [each.number for each in values if isinstance(each, Traced)]
     found = set[int]()
     while waiting:

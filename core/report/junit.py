@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from xml.etree import ElementTree
 
+from ..errors import labelled
 from ..harness.compare import describe
 from ..harness.engine import STANDARD
-from ..harness.labels import UNMADE, notes, suspects
+from ..harness.labels import (
+    UNMADE,
+    account,
+    against,
+    engine_name,
+    motion_unit,
+    notes,
+    suspects,
+)
 from ..harness.record import REFERENCE, Deviations, Outcome, Record, Results
 from ..history.findings import Kind, Regressions
 from ..history.store import Pair
+from ..unit_text import motion_word
 
 COUNTS = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -29,7 +40,9 @@ def to_junit(results: Results) -> bytes:
     A missing engine or feature, or an output without a verdict, is a skipped test with its reason.
     A pair without a record is an error.
 
-    The output of a suite holds the notes on its case's geometry.
+    The output of a test holds every error with its tolerance, and the reasons for those that are
+    missing; that of a suite the signs, the notes on its case's geometry, and the facts of its
+    records.
     """
     root = ElementTree.Element("testsuites", name="kincheck")
     for case in dict.fromkeys(
@@ -46,16 +59,20 @@ def to_junit(results: Results) -> bytes:
                     verdict, message = _verdict(record, output, deviations)
                     if verdict:
                         ElementTree.SubElement(test, verdict, message=message + suspicion)
+                    _write(test, _numbers(record, output, deviations))
         for name, engine, mode in results.missing:
             if name == case:
                 test = _test(suite, (case, engine, mode), "not run")
                 ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
-        lines = [f"note: {note}" for named, note in notes(results.run) if named == case]
+        facts = results.run.get("cases", {}).get(case, {})
+        lines = [f"signs: {facts['signs']}"] if facts.get("signs") else []
+        lines += [labelled(note) for named, note in notes(results.run) if named == case]
         lines += [f"suspect: {why}" for named, why in suspects(results) if named == case]
-        if lines:
-            ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub(
-                "\ufffd", "\n".join(lines)
-            )
+        for record in results.records:
+            if record.case == case:
+                said = "; ".join(filter(None, (record.message, account(record))))
+                lines.append(f"{engine_name(record)}: {record.outcome.shown}: {said}")
+        _write(suite, lines)
         count_tests(suite)
     ElementTree.indent(root)
     for element in root.iter():
@@ -68,6 +85,25 @@ def count_tests(suite: ElementTree.Element) -> None:
     """Set a suite's numbers of tests, failures, errors and skipped tests."""
     for count, tag in COUNTS.items():
         suite.set(count, str(sum(1 for _ in suite.iter(tag))))
+
+
+def _write(element: ElementTree.Element, lines: Sequence[str]) -> None:
+    """Add the output of a test or a suite, if there is any."""
+    if lines:
+        text = FORBIDDEN.sub("\ufffd", "\n".join(lines))
+        ElementTree.SubElement(element, "system-out").text = text
+
+
+def _numbers(record: Record, output: str, deviations: Deviations) -> list[str]:
+    """Return a line for each error of an output, and the reason for those that are missing."""
+    unit = record.outputs[output].unit if output in record.outputs else ""
+    lines = [
+        f"{motion_word(quantity, unit)}: {each.max_abs:.3g} of {each.tolerance:.3g}"
+        f" {motion_unit(unit, quantity)}, rms {each.rms:.3g}, largest at sample {each.worst_step},"
+        f" against {against(each.against)}"
+        for quantity, each in deviations.items()
+    ]
+    return lines + [f"not compared: {deviations.reason}"] * bool(deviations.reason)
 
 
 def _test(

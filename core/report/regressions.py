@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ..case.io.escape import visible
+from ..doors import offers
 from ..errors import number_of, shortened
 from ..harness.labels import motion_unit, number, product, unread_count
 from ..history.findings import WHY, Finding, Kind, Loose, Regressions, Step
@@ -172,8 +173,28 @@ def step_lines(steps: Iterable[Step], *, over: bool) -> list[str]:
     ]
 
 
+def searches(found: Regressions) -> list[str]:
+    """Return the command for each engine with another version and other results, if there is such a
+    command: it finds the release.
+    """
+    lines: list[str] = []
+    for change in found.changes if "bisect" in offers("commands") else ():
+        cases = [each.case for each in found.findings if each.engine == change.what]
+        if cases and change.before and change.now:
+            names = " ".join([*dict.fromkeys(cases)][:NAMED])
+            ends = f"--from {change.before} --to {change.now}"
+            lines.append(f"{change}: kincheck bisect {change.what} {names} {ends}")
+    return lines
+
+
 STEPS = {False: "Steps in the history that still stand", True: "Steps that came and went"}
 """Titles of the lists of `step_lines`."""
+
+
+def lists(found: Regressions) -> list[tuple[bool, str, list[str]]]:
+    """Return the lists behind the findings: whether each is folded, its title and its lines."""
+    steps = [(over, title, step_lines(found.steps, over=over)) for over, title in STEPS.items()]
+    return [(False, "To find the release", searches(found)), *steps]
 
 
 def step_says(step: Step) -> str:
@@ -234,9 +255,7 @@ def to_markup(found: Regressions) -> Markup:
             headline=headline(found),
             found=found,
             groups=[group for group in groups if group[2]],
-            steps=[
-                (over, title, step_lines(found.steps, over=over)) for over, title in STEPS.items()
-            ],
+            steps=lists(found),
             passed_by=passed_by_says(found),
             loose=loose_says(found.loose),
             longest=LONGEST,
@@ -269,8 +288,7 @@ def _lines(found: Regressions) -> Iterator[str]:
         if len(group) > LONGEST:
             yield from (f"and {len(group) - LONGEST} more, all in the JSON.", "")
         yield from ["</details>", ""] if folded else []
-    for over, title in STEPS.items():
-        lines = step_lines(found.steps, over=over)
+    for over, title, lines in lists(found):
         if lines:
             yield from (
                 [f"<details><summary>{title} ({len(lines)})</summary>", ""]
@@ -311,8 +329,8 @@ def print_regressions(found: Regressions, file: TextIO) -> None:
             table.add_row(*(Text(visible(cell)) for cell in (each.engine, each.where, each.what)))
         console.print(terminal.indent_table(table))
         _print_rest(console, len(group))
-    for over, title in STEPS.items():
-        _print_list(console, title.lower(), step_lines(found.steps, over=over))
+    for _, title, lines in lists(found):
+        _print_list(console, title.lower(), lines)
     _print_list(console, "tolerances that could be tightened", loose_says(found.loose))
 
 

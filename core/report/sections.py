@@ -150,6 +150,7 @@ class Section:
             side.
         rows: cells; a row of one cell is a heading of those below it.
         links: file that belongs to each row, beside the page; empty for none.
+        wrong: places of the rows in red.
     """
 
     title: str
@@ -160,6 +161,7 @@ class Section:
     rows: Sequence[Sequence[str]]
     diagrams: Sequence[Diagram] = ()
     links: Sequence[str] = ()
+    wrong: Sequence[int] = ()
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,16 @@ from rich.console import Console
 from rich.text import Text
 
 from ..case.io.escape import visible
+from ..errors import labelled
 from ..harness.labels import (
+    account,
     against,
     motion_unit,
     notes,
     shorten_names,
     signs,
     suspects,
+    unmade,
     unread,
     unsound,
 )
@@ -99,7 +102,8 @@ def print_table(results: Results, file: IO[str], *, reactions: bool = False) -> 
 
 def print_outputs(results: Results, file: TextIO) -> None:
     """Print a line for each output of each record with its largest errors and their tolerances, the
-    reasons for missing errors, then the messages of `print_table`.
+    reasons for missing errors, a line of facts for each record with an answer, then the messages of
+    `print_table`.
 
     If the console is too narrow, the outputs stand below their case and engine.
     """
@@ -127,6 +131,10 @@ def print_outputs(results: Results, file: TextIO) -> None:
         for reason, outputs in _missing_reasons(record).items():
             line = f"–: {record.case} · {record.engine}: {shorten_names(outputs)}: {reason}"
             console.print(Text(visible(line)), soft_wrap=True)
+    for record in results.records:
+        if record.samples is not None:
+            line = f"{record.case} · {record.engine}: {account(record)}"
+            console.print(Text(visible(line), "dim"))
     print_table(results, file)
 
 
@@ -222,7 +230,7 @@ def print_signs(run: Facts, console: Console) -> None:
 def print_messages(results: Results, console: Console) -> None:
     """Print notes on the cases, suspicions, every message, and a count of outcomes."""
     for case, note in notes(results.run):
-        console.print(Text(visible(f"note: {case}: {note}")), soft_wrap=True)
+        console.print(Text(visible(labelled(note, case))), soft_wrap=True)
     for case, why in suspects(results):
         console.print(Text(visible(f"suspect: {case}: {why}"), style="bold"), soft_wrap=True)
     said = list[str]()
@@ -240,7 +248,7 @@ def print_messages(results: Results, console: Console) -> None:
         ", ".join(f"{count} {outcome.shown}" for outcome in Outcome if (count := counts[outcome]))
         or "nothing was run"
     )
-    if lost := unread(results.run):
+    for lost in filter(None, (unmade(results), unread(results.run))):
         console.print(Text(visible(lost), style="bold red"), soft_wrap=True)
 
 
@@ -363,8 +371,10 @@ def to_markdown(results: Results) -> str:
         )
         lines.append(row([code(case), *cells]))
     lines += ["", f"{escape_markdown(_legend(results))}."]
-    lines += [escape_markdown(f"{sentence}.") for sentence in [unread(results.run)] if sentence]
-    lines += [escape_markdown(f"Note: {case}: {note}.") for case, note in notes(results.run)]
+    lost = filter(None, (unmade(results), unread(results.run)))
+    lines += [escape_markdown(f"{sentence}.") for sentence in lost]
+    told = [labelled(note, case) for case, note in notes(results.run)]
+    lines += [escape_markdown(f"{each[:1].upper()}{each[1:]}.") for each in told]
     lines += [escape_markdown(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
         escape_markdown(

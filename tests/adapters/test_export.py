@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -30,9 +31,11 @@ from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation
 
 from ..oracles.naive import A
+from ..support.case_texts import write
 from ..support.engine_motion import cutting, mechanism_of
 from ..support.exported import READERS, read
 from ..support.mechanisms import mcpherson, slider_crank
+from ..support.model_files import driven
 from ..support.written_mechanisms import CASES, Z, assert_read, case, coupled_loop, way
 
 
@@ -84,6 +87,19 @@ def test_export_of_names_with_blanks(to, tmp_path):
     """OpenSim ends the process at a name with a blank."""
     other, path = renamed(slider_crank(), crank="left crank", rod="rod/2")
     assert_read(read(to, writer_of(to)(other, path, {}), other, tmp_path), other, path, True)
+
+
+def test_sdf_names_differ_in_a_model(tmp_path):
+    """As libsdformat wants them, of any elements: the spring of a slide has the joint's name."""
+    model = """<mujoco><worldbody><body name="a"><joint name="ja" axis="0 1 0"/><geom size="0.1"/>
+    <body name="c" pos="0.5 0 0"><joint name="jc" type="slide" axis="1 0 0" stiffness="20"/>
+    <geom size="0.1"/></body></body></worldbody></mujoco>"""
+    case = load(write(tmp_path, model, "m.xml"), driven("ja:0:0.1:3", hold=("jc",)))
+    (text,) = written(case, writer_of("sdf")).values()
+    (found,) = ElementTree.fromstring(text).iter("model")
+    names = [each.get("name") for each in found]
+    assert len(names) == len({*names})
+    assert "jc.spring" in names
 
 
 def test_sdf_export_refuses_two_mimics():

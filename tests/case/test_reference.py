@@ -12,9 +12,8 @@ from kincheck.adapters.native import Native
 from kincheck.core.case.curves import (
     Printed,
     bound_rounding,
-    have_common_factor,
     interpolate,
-    is_even_grid,
+    is_set,
     match_rows,
     slopes,
 )
@@ -381,12 +380,13 @@ def test_sweep_at_missing_reference(tmp_path):
         ("1.23457e-03 5.00000e+02", [5e-9, 5e-4]),
         ("0.4 0.412 0.05", 5e-4),  # a spreadsheet leaves out zeros at the end
         ("12.3 0.412 1.57", [5e-2, 5e-4, 5e-3]),
-        ("12.3 0.412 0.05 1.571", 5e-4),
+        ("12.3 0.412 0.05 1.571", [5e-3, 5e-4, 5e-4, 5e-4]),
         ("1.5e-3 2.25e-2", 5e-5),
         ("0.25 0.5 1.75", 5e-3),
         ("100 1234 1200", 0.5),
         ("1 0 -1", 0.5),
-        ("123457 7.5", 0.05),
+        ("123457 7.5", [0.5, 0.05]),
+        ("9.7361 10.0332 200 0.5 0", [5e-5, 5e-5, 5e-4, 5e-5, 5e-5]),
         ("0 0.0", 0.0),  # no digit that anything could be rounded to
         ("0.000 0.000", 5e-4),
         ("0.1234567890123456 0.5", 0.0),
@@ -395,20 +395,41 @@ def test_sweep_at_missing_reference(tmp_path):
     ],
 )
 def test_half_unit_of_printed_digits(texts, half):
+    np.testing.assert_allclose(printed(texts)[1], half, rtol=1e-9)
+
+
+def printed(texts, **options):
+    """Return numbers, and half a unit of the last digit of each."""
     column, numbers = Printed(), texts.split()
     for text in numbers:
         column.add(text)
-    found = column.half(np.array(numbers, dtype=float))
-    np.testing.assert_allclose(found, half, rtol=1e-9)
+    values = np.array(numbers, dtype=float)
+    return values, column.half(values, **options)
 
 
-def test_even_and_multiple_driver_values():
-    assert is_even_grid(np.array([0.0625, 0.125, 0.1875]))
-    assert not is_even_grid(np.round(np.arange(9) / 7.0, 6))
-    assert have_common_factor(np.array([-80.0, -65.0, -5.0, 0.0]), 0)
-    assert have_common_factor(np.array([0.25, 0.5, 1.75]), 2)
-    assert not have_common_factor(np.array([-79.9, -65.2, -5.1]), 1)
-    assert not have_common_factor(np.array([1e60, 3e60]), 2)
+def test_half_units_of_single_numbers():
+    _, half = printed("9.7361 10.0332 200 0.00 0.0 0 1.2e+01 nan", alone=True)
+    assert half[:-1] == pytest.approx([5e-5, 5e-5, 0.05, 5e-3, 5e-5, 5e-5, 5e-3])
+    assert printed("0.123457 0.5 -12.35", alone=True)[1] == pytest.approx([5e-7, 5e-5, 5e-3])
+
+
+@pytest.mark.parametrize(
+    ("texts", "expected"),
+    [
+        ("0.0625 0.125 0.1875 0.25", True),
+        ("0.01 0.02 0.03 0.02 0.01", True),
+        ("0 0.143 0.286 0.429 0.571 0.714", False),  # sevenths
+        ("0 5.73 11.46 17.19 22.92 28.65", False),  # tenths of a radian, in degrees
+        (" ".join(f"{5.72957795 * k:.6g}" for k in range(21)), False),
+        (" ".join(f"{k * k * 0.2:g}" for k in range(12)), True),
+        ("-80 -65 -5 0 10 15 20 35 40 50", True),
+        ("0.25 0.5 1.75 2 3 3.25 3.5 4 5 5.25", True),
+        ("-79.9 -65.2 -5.1 1.1 2.2 3.4 5.6 7.8 9.9 10.1", False),
+        ("1.2345e60 3.5e60 4e60", False),
+    ],
+)
+def test_driver_values_that_somebody_set(texts, expected):
+    assert is_set(*printed(texts)) == expected
 
 
 def stripped(decimals):

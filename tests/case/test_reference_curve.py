@@ -98,8 +98,8 @@ def test_measured_curve_is_judged(tmp_path, car, kind):
 def test_curve_with_map_and_signs(tmp_path, car):
     """Columns of other names, one with the opposite sign and without a unit; signs; the samples."""
     toe, camber = car[1]
-    file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Sturz [deg]")
-    columns = ("z=stroke", "Spur=-toe [deg]", "Sturz=camber")
+    file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Neigung [deg]")
+    columns = ("z=stroke", "Spur=-toe [deg]", "Neigung=camber")
     record, *_ = judged(car, file, columns=columns, signs="iso8855", own_samples=True)
     assert record.outcome is Outcome.PASS
     assert not record.evidence.sound  # no citation
@@ -185,8 +185,8 @@ def test_run_with_measured_curve(tmp_path, car, capsys):
     strut_of_table(tmp_path, "0.05:21")
     table = tmp_path / "car.csv"
     toe, camber = car[1]
-    file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Sturz [deg]")
-    stated = ["--map", "z=stroke", "--map", "Spur=-toe [deg]", "--map", "Sturz=camber"]
+    file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Neigung [deg]")
+    stated = ["--map", "z=stroke", "--map", "Spur=-toe [deg]", "--map", "Neigung=camber"]
     stated += [part for each in ACCURACY for part in ("--accuracy", each)]
     command = ["run", str(table), "--engine", "native"]
     assert main([*command, "--reference", str(file), *stated, "--citation", "rig"]) == 0

@@ -7,17 +7,18 @@ import subprocess
 import sys
 
 import pytest
+from kincheck.core.extras import python_of
 
 from ..support.sources import ROOT
 
 FOLDER = ROOT / "docs" / "upstream"
 
 
-def printed(name, package):
+def printed(name, package, python=sys.executable):
     """What a reproducer prints, on its lines after the version."""
-    if importlib.util.find_spec(package) is None:
+    if importlib.util.find_spec(package) is None and python == sys.executable:
         pytest.skip(f"{package} is not installed")
-    command = [sys.executable, FOLDER / f"{name}.py"]
+    command = [python, FOLDER / f"{name}.py"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return done.stdout.splitlines()
 
@@ -27,6 +28,39 @@ def test_mujoco_tendon_equality_lacks_acceleration_term():
     for line in lines:
         assert "expected -8" in line
         assert "found 0 " in line
+
+
+CONNECTS = re.compile(r"(\w+) \S+, (connect|weld): .* expected -2, found (\S+)")
+
+
+def test_mujoco_connect_has_acceleration_term():
+    """Since 3.7.0; each found number has four digits."""
+    found = [CONNECTS.match(line).groups() for line in printed("mjx_connect_weld", "mujoco")]
+    assert found == [("MuJoCo", tie, "-2") for tie in ("connect", "weld")]
+
+
+def test_mjx_connect_lacks_acceleration_term():
+    if (python := python_of("mjx")) == sys.executable:
+        pytest.skip("MJX has no environment of its own here")
+    found = [CONNECTS.match(line) for line in printed("mjx_connect_weld", "mujoco", python)]
+    of_mjx = [each.groups() for each in found if each and each[1] == "MJX"]
+    assert of_mjx == [("MJX", tie, "0") for tie in ("connect", "weld")]
+
+
+def test_mujoco_full_inertia_compiled_exactly():
+    """Since 3.14.0."""
+    _, line = printed("mujoco_full_inertia", "mujoco")
+    median, largest = map(float, numbers(line)[:2])
+    assert 0.0 < median < largest < 1e-14
+    assert line.endswith("above 1e-12: 0")
+
+
+def test_dart_reads_no_tensor_of_mjcf():
+    _, *lines = printed("dart_mjcf_inertia", "dartpy")
+    assert len(lines) == 4
+    for line in lines:
+        kept = "mass 2, centre 0.3" if "with geom" in line else "mass 1, centre 0"
+        assert line.endswith(f"found {kept}, moments [1.0, 1.0, 1.0]")
 
 
 def test_pinocchio_acceleration_error_grows_with_mu():

@@ -12,9 +12,9 @@ from pathlib import Path
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import CurveOptions
-from kincheck.core.cli.shared_options import recorded_engines
 from kincheck.core.extensions.recorded.engine import RecordedEngine
 from kincheck.core.extensions.recorded.fmu import read_fmu
+from kincheck.core.extensions.recorded.source import recorded_engines
 
 from .fuzzing import changing, read_or_refused, written
 from .keeping import seeds_in_file

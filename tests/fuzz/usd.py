@@ -1,6 +1,6 @@
 """Stages of USD; the second line says how they are driven."""
 
-from kincheck.core.extensions.trees.usd import GENERIC, IN_BODY, IN_JOINT, ROD, TYPES
+from kincheck.core.extensions.usd.usd import GENERIC, IN_BODY, IN_JOINT, ROD, TYPES
 
 from .fuzzing import changing, reading
 from .keeping import seeds_in_file

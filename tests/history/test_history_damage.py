@@ -81,11 +81,45 @@ def test_unusable_history_costs_no_result(
     told, said = capsys.readouterr()
     (problem,) = [line for line in said.splitlines() if line.startswith("kincheck: ")]
     assert problem.startswith(f"kincheck: history {path}: cannot be ")
-    assert problem.endswith("; the run is not in the history")
+    kept = f"; the run is not in the history: its results are in {junit} and {out}"
+    assert problem.endswith(kept)
     assert "1 pass" in told
     assert len(json.loads((out / "results.json").read_text())["records"]) == 1
     assert "crank" in junit.read_text()
     assert NO_TRENDS in (out / "report.html").read_text()
+
+
+def pages(path, change):
+    """Change every fifth page of a history but the first, and yield what a run then says."""
+    nights(path, 4)
+    whole = path.read_bytes()
+    for begin in range(2 * 4096, len(whole), 5 * 4096):
+        path.write_bytes(
+            whole[:begin] + change(whole[begin : begin + 4096]) + whole[begin + 4096 :]
+        )
+        yield begin
+
+
+@pytest.mark.parametrize(
+    "change",
+    [lambda page: bytes(len(page)), lambda page: page[:300] + page[300:][::-1]],
+    ids=["zeros", "turned around"],
+)
+def test_history_of_damaged_pages(kincheck_main, path, capsys, change):
+    """Nothing is written into a file that cannot be read; damaged records are told."""
+    for begin in pages(path, change):
+        before = path.read_bytes()
+        status = kincheck_main("run crank --quiet --history", path)
+        said = capsys.readouterr().err
+        if "; the run is not in the history: say --out DIR to keep it" in said:
+            # beyond the head, which counts who has opened it
+            assert (status, path.read_bytes()[100:]) == (2, before[100:]), begin
+        elif status == 2:
+            assert "cannot be read" in said
+        else:
+            assert main(["report", "--history", str(path)]) < 2, begin
+        assert not path.with_name(f"{path.name}-wal").exists()
+        capsys.readouterr()
 
 
 DAMAGE = {

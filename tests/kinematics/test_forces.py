@@ -18,7 +18,7 @@ from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Mechanism
 from kincheck.core.mechanism.motions import JointAngle, Path, Ramp, Sine
-from kincheck.core.program.llvm.compiler import available
+from kincheck.core.program.llvm.machine_code import available
 
 from ..oracles import naive, newton_euler
 from ..support.loads import GRAVITY, loaded, pushes, six, solved

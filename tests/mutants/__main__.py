@@ -1,11 +1,12 @@
 """Share of small mistakes that the tests find: python -m tests.mutants 100
 
 One token of core or adapters is changed (an operator, a comparison, a number, a sign, min and max,
-a condition, a returned value), and the tests run until one fails: first those that enter the
-function, then the others of their files, then the rest. Each room has mutants in proportion to its
+a condition, a returned value), and the tests run until one fails: those that enter the
+block of its line, first some of each file. Each room has mutants in proportion to its
 tokens. Work is done in a temporary copy, with the engines of the interpreter that runs this; what
 tests enter and what was found is kept in .mutants/, and the next run goes on from there.
 
+    python -m tests.mutants 0                   only what tests enter, which CI keeps
     python -m tests.mutants 200 --seed 5        other mutants
     python -m tests.mutants --only 3fa9c1d2     one mutant again
     python -m tests.mutants --survivors         those that no test has found, as differences
@@ -75,11 +76,12 @@ def main(argv: Sequence[str]) -> int:
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         Path(folder).chmod(0o755)  # some tests are another user for a while
         sandbox = Sandbox(Path(folder), sources)
-        entered = Entered.read(KEPT / "entered.json")
+        entered = Entered.read(KEPT / "entered.json.gz")
         entered.renew(sandbox)
         for number, mutant in enumerate(chosen, 1):
             if again or mutant.id not in found:
-                found[mutant.id] = judge(mutant, sandbox, entered, options.quick)
+                text = sources[mutant.path]
+                found[mutant.id] = judge(mutant, text, sandbox, entered, options.quick)
                 file.write_text(json.dumps(found, indent=1), encoding="utf-8")
             result = found[mutant.id]
             print(
@@ -88,7 +90,8 @@ def main(argv: Sequence[str]) -> int:
                 f"  {result['by']}",
                 flush=True,
             )
-    print(table([found[mutant.id] for mutant in chosen]))
+    if chosen:
+        print(table([found[mutant.id] for mutant in chosen]))
     return 0
 
 
@@ -115,14 +118,16 @@ def sample(sites: Mapping[str, Sequence[Sequence[Mutant]]], count: int, seed: in
     return chosen
 
 
-def judge(mutant: Mutant, sandbox: Sandbox, entered: Entered, quick: bool) -> dict[str, Any]:
+def judge(
+    mutant: Mutant, text: str, sandbox: Sandbox, entered: Entered, quick: bool
+) -> dict[str, Any]:
     """Run the tests of a mutant until one fails."""
     started = time.monotonic()
     end, by = "survived", ""
     if reason := harmless(mutant):
         end, by = "harmless", reason
     else:
-        stages = [*entered.stages(mutant)]
+        stages = [*entered.stages(mutant, text)]
         for tests in stages[:1] if quick else stages:
             run = _run(mutant, sandbox, tests, entered)
             if run.outcome != "passed":

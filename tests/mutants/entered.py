@@ -1,13 +1,15 @@
-"""Outcomes of tests, and the functions that each test enters: `sitecustomize` of the interpreter
-that runs mutants, and a plugin of pytest there.
+"""Outcomes of tests, and the blocks that each test enters: `sitecustomize` of the interpreter that
+runs mutants, and a plugin of pytest there.
 
-Each function of the package sets a byte of a file when it begins. The file is mapped into the
-memory of all processes that a test starts, however they end.
+A block is statements of a function that run one after another: its body, a branch, a loop. Each
+sets a byte of a file when it begins. The file is mapped into the memory of all processes that a
+test starts, however they end.
 PYTEST_DONT_REWRITE: the interpreter loads this before pytest.
 """
 
 import ast
 import builtins
+import hashlib
 import json
 import mmap
 import os
@@ -17,7 +19,7 @@ from pathlib import Path
 FOLDER = Path(os.environ.get("KINCHECK_TESTS_ENTER", ""))
 """Of the files that are written."""
 FUNCTIONS = os.environ.get("KINCHECK_FUNCTIONS", "")
-"""File that numbers the functions by path and name; without it none is marked."""
+"""File that numbers the blocks by their names; without it none is marked."""
 PACKAGE = f"{os.sep}site{os.sep}kincheck{os.sep}"
 MARK = "__entered__"
 
@@ -36,14 +38,28 @@ def outermost(syntax):
                 waiting.append((child, scope))
 
 
-def _mark(function, number):
-    for node in ast.walk(function):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            first = node.body[0]
-            (mark,) = ast.parse(f"{MARK}[{number}] = 1").body
-            for each in ast.walk(mark):
-                ast.copy_location(each, first)
-            node.body.insert(ast.get_docstring(node) is not None, mark)
+def blocks(function):
+    """Return the blocks of a function, its own first."""
+    fields = (
+        (node, name) for node in ast.walk(function) for name in ("body", "orelse", "finalbody")
+    )
+    found = (getattr(node, name, None) for node, name in fields)
+    return [each for each in found if isinstance(each, list) and each]
+
+
+def names(path, name, function):
+    """Return the names of the blocks of a function; other text has others."""
+    text = hashlib.sha256(ast.dump(function).encode()).hexdigest()[:8]
+    return [f"{path} {name} {text}#{k}" for k in range(len(blocks(function)))]
+
+
+def _mark(path, name, function):
+    for block, each in zip(blocks(function), names(path, name, function), strict=True):
+        (mark,) = ast.parse(f"{MARK}[{numbers[each]}] = 1").body
+        for part in ast.walk(mark):
+            ast.copy_location(part, block[0])
+        said = isinstance(block[0], ast.Expr) and isinstance(block[0].value, ast.Constant)
+        block.insert(said, mark)  # behind a docstring
 
 
 class _Marking(SourceFileLoader):
@@ -52,8 +68,8 @@ class _Marking(SourceFileLoader):
         if found:
             data = ast.parse(data, path)
             for name, function in [*outermost(data)]:
-                if (number := numbers.get(f"{inside} {name}")) is not None:
-                    _mark(function, number)
+                if names(inside, name, function)[0] in numbers:
+                    _mark(inside, name, function)
         return _compile(self, data, path, **options)
 
 

@@ -1,5 +1,7 @@
-"""Which tests enter which function: taken down once for a text of a test file, and kept."""
+"""Which tests enter which block: taken down once for a text of a test file, and kept."""
 
+import ast
+import gzip
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
@@ -8,6 +10,7 @@ from itertools import zip_longest
 from pathlib import Path
 
 from ..support.sources import ROOT, SOURCES, TESTS, imported, module_of, tree
+from .entered import blocks, names, outermost
 from .sandbox import Sandbox
 from .sites import Mutant
 
@@ -21,30 +24,34 @@ LIMIT = 7200.0
 
 @dataclass
 class Entered:
-    """Functions that tests enter.
+    """Blocks of functions that tests enter.
 
     Attributes:
         file: where it is kept.
         texts: test file -> checksum of the text that was run.
-        functions: "path function" in the order of their bits.
-        tests: test -> its seconds, and the bits of the functions that it enters.
+        blocks: their names in the order of their bits.
+        tests: test -> its seconds, and the bits of the blocks that it enters.
         failing: tests that fail without a change of the sources; they judge nothing.
     """
 
     file: Path
     texts: dict[str, str] = field(default_factory=dict)
-    functions: list[str] = field(default_factory=list)
+    blocks: list[str] = field(default_factory=list)
     tests: dict[str, tuple[float, str]] = field(default_factory=dict)
     failing: list[str] = field(default_factory=list)
 
     @classmethod
     def read(cls, file: Path) -> "Entered":
-        return cls(file, **json.loads(file.read_text("utf-8"))) if file.exists() else cls(file)
+        return (
+            cls(file, **json.loads(gzip.decompress(file.read_bytes())))
+            if file.exists()
+            else cls(file)
+        )
 
     def _keep(self) -> None:
         kept = {name: value for name, value in vars(self).items() if name != "file"}
         beside = self.file.with_suffix(".new")
-        beside.write_text(json.dumps(kept), encoding="utf-8")
+        beside.write_bytes(gzip.compress(json.dumps(kept).encode(), 5))
         beside.replace(self.file)
 
     def renew(self, sandbox: Sandbox) -> None:
@@ -64,7 +71,7 @@ class Entered:
                 folders.setdefault(Path(path).parent, []).append(path)
         for files in folders.values():
             for some in (files[k : k + AT_ONCE] for k in range(0, len(files), AT_ONCE)):
-                print(f"which test enters which function: {', '.join(some)}", flush=True)
+                print(f"which test enters which block: {', '.join(some)}", flush=True)
                 self._take_down(sandbox, some)
                 self.texts |= {path: now[path] for path in some}
                 self._keep()
@@ -73,15 +80,15 @@ class Entered:
         run = sandbox.run(files, LIMIT, marked=True, first=False)
         if run.outcome in ("timeout", "unknown"):
             raise SystemExit(f"{run.output}\n{', '.join(files)}: {run.outcome}")
-        bits = {function: 1 << k for k, function in enumerate(self.functions)}
+        bits = {block: 1 << k for k, block in enumerate(self.blocks)}
         entered = {
             test: sum(
                 bits.setdefault(name, 1 << len(bits))
-                for name in (sandbox.functions[number] for number in numbers)
+                for name in (sandbox.blocks[number] for number in numbers)
             )
             for test, numbers in sandbox.read("entered")
         }
-        self.functions = [*bits]
+        self.blocks = [*bits]
         seconds: dict[str, float] = {}
         for test, duration, _ in sandbox.read("reports"):
             seconds[test] = seconds.get(test, 0.0) + duration
@@ -93,13 +100,31 @@ class Entered:
             for test in again.failing:
                 print(f"fails without a change, and judges nothing: {test}")
 
-    def stages(self, mutant: Mutant) -> Iterator[list[str]]:
-        """Yield the tests of a mutant, those first that most likely see it, each test once: some
-        that enter the function, the others, those in the same files, and the rest.
+    def stages(self, mutant: Mutant, text: str) -> Iterator[list[str]]:
+        """Yield the tests of a mutant, those first that most likely see it, each test once.
+
+        Of a line in a block: some that enter the block, or that entered another text of its
+        function, then the others. No further test runs the line. Elsewhere, and in a function that
+        no test entered: those that enter the function or its module, those in the same files, and
+        the rest.
+
+        Args:
+            text: of the file, unchanged.
         """
-        function = mutant.function
+        function, block = mutant.function, block_of(mutant, text)
+        own = f"{_inside(mutant.path)} {function} "
+        if block and any(name.startswith(own) for name in self.blocks):
+            known = block.partition("#")[0] + "#"
+            inside = self._entering(
+                lambda name: name == block or (name.startswith(own) and not name.startswith(known))
+            )
+            some = [test for test in self._some(inside) if test not in self.failing]
+            yield sorted(some, key=self.seconds)
+            rest = {*inside} - {*some} - {*self.failing}
+            yield sorted(rest, key=self.seconds)
+            return
         if function:
-            first = self._entering(lambda name: name == f"{_inside(mutant.path)} {function}")
+            first = self._entering(lambda name: name.startswith(own))
         else:
             first = self._entering(lambda name: name.split()[0] == _inside(mutant.path))
         files = {file_of(test) for test in first}
@@ -128,11 +153,28 @@ class Entered:
         return some
 
     def _entering(self, chosen) -> list[str]:
-        mask = sum(1 << k for k, name in enumerate(self.functions) if chosen(name))
+        mask = sum(1 << k for k, name in enumerate(self.blocks) if chosen(name))
         return [test for test, (_, entered) in self.tests.items() if int(entered, 16) & mask]
 
     def seconds(self, test: str) -> float:
         return self.tests[test][0]
+
+
+def block_of(mutant: Mutant, text: str) -> str:
+    """Return the name of the smallest block with the mutant's line; empty outside of all, as in the
+    head of a function.
+    """
+    line = mutant.start[0]
+    for name, function in outermost(ast.parse(text)):
+        if name == mutant.function and function.lineno <= line <= function.end_lineno:
+            every = zip(blocks(function), names(_inside(mutant.path), name, function), strict=True)
+            around = [
+                (each[-1].end_lineno - each[0].lineno, block)
+                for each, block in every
+                if each[0].lineno <= line <= each[-1].end_lineno
+            ]
+            return min(around, default=(0, ""))[1]
+    return ""
 
 
 def file_of(test: str) -> str:

@@ -18,7 +18,7 @@ from importlib.util import cache_from_source
 from pathlib import Path
 
 from ..support.sources import ROOT
-from .entered import outermost
+from .entered import names, outermost
 from .sites import Mutant
 
 MEMORY = 12 * 2**30
@@ -45,7 +45,7 @@ class Sandbox:
     """A temporary copy in which one file at a time is changed.
 
     Attributes:
-        functions: "path name" of each function that is in no other, in the order of their marks.
+        blocks: names of the blocks of all functions, in the order of their marks.
     """
 
     def __init__(self, folder: Path, sources: Mapping[str, str]) -> None:
@@ -54,8 +54,10 @@ class Sandbox:
         self._work = folder / "work"
         self._python = folder / "venv" / "bin" / "python"
         listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-        names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-        for name in filter(None, names.split("\0")):
+        listing = subprocess.run(
+            listed, cwd=ROOT, capture_output=True, text=True, check=True
+        ).stdout
+        for name in filter(None, listing.split("\0")):
             if (ROOT / name).is_file():
                 (self.root / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(ROOT / name, self.root / name)
@@ -66,14 +68,15 @@ class Sandbox:
         for file in (self.root / "core/kincheck").iterdir():
             (package / file.name).symlink_to(file)
         self._install(folder)
-        self.functions = [
-            f"{path.removeprefix('core/kincheck/')} {name}"
+        self.blocks = [
+            block
             for path, text in sources.items()
-            for name, _ in outermost(ast.parse(text))
+            for name, function in outermost(ast.parse(text))
+            for block in names(path.removeprefix("core/kincheck/"), name, function)
         ]
-        self._numbers = folder / "functions.json"
+        self._numbers = folder / "blocks.json"
         self._numbers.write_text(
-            json.dumps({name: k for k, name in enumerate(self.functions)}), encoding="utf-8"
+            json.dumps({name: k for k, name in enumerate(self.blocks)}), encoding="utf-8"
         )
 
     def _install(self, folder: Path) -> None:
@@ -119,14 +122,14 @@ class Sandbox:
 
         Args:
             limit: seconds.
-            marked: whether functions that are entered are taken down.
+            marked: whether blocks that are entered are taken down.
             first: whether the run ends with the first test that fails.
         """
         for each in (self._work, self.reports, self.root / ".hypothesis"):
             shutil.rmtree(each, ignore_errors=True)
         self._work.mkdir()
         self.reports.mkdir()
-        (self.reports / "marks").write_bytes(bytes(len(self.functions)))
+        (self.reports / "marks").write_bytes(bytes(len(self.blocks)))
         (self._work / "tests").write_text("\n".join(tests), encoding="utf-8")
         environment = {
             **os.environ,

@@ -7,6 +7,7 @@ import pytest
 
 from ..support.sources import ROOT, files
 from .__main__ import HARMLESS, harmless, sample, table
+from .related import Entered, block_of
 from .sites import mutants
 
 SOURCE = '''"""Docstring of 1."""
@@ -87,6 +88,39 @@ def test_harmless_mutants_are_of_present_code():
             each for path in holding for place in mutants(path, sources[path]) for each in place
         )
         assert any(harmless(each) == mark["reason"] for each in found), mark
+
+
+def test_mutant_has_block_of_line():
+    found = [each for place in mutants("case.py", SOURCE) for each in place]
+    by_line = {each.line: block_of(each, SOURCE).partition("#")[2] for each in found}
+    assert by_line == {
+        "LIMIT: float = 2.5": "",
+        "count: int = 1": "",
+        "def chosen(self, values: list[int] | None, other=0):": "",
+        "if values is None and not self.ready:": "0",
+        'return f"{other + 1}"': "1",
+        "if value:": "2",
+        "continue": "3",
+        "return max(values[0] - other, min(k, 3)) <= -LIMIT": "0",
+    }
+
+
+def test_tests_of_mutant_enter_its_block(tmp_path):
+    """Tests that entered another text of the function may too; further ones never."""
+    (mutant,) = (
+        each for place in mutants("case.py", SOURCE) for each in place if each.line == "continue"
+    )
+    block = block_of(mutant, SOURCE)
+    blocks = [block, block[:-1] + "0", "case.py Case.chosen 0ld#0", "case.py other 0ld#0"]
+    tests = {f"tests/test_x.py::{k}": (1.0, f"{1 << k:x}") for k in range(4)}
+    entered = Entered(tmp_path / "map", {}, blocks, tests, [])
+    stages = [*entered.stages(mutant, SOURCE)]
+    assert sorted(test for tests in stages for test in tests) == [
+        "tests/test_x.py::0",
+        "tests/test_x.py::2",
+    ]
+    entered._keep()
+    assert [*Entered.read(tmp_path / "map").stages(mutant, SOURCE)] == stages
 
 
 def test_mutant_table_counts_ends_by_room():

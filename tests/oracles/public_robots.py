@@ -18,12 +18,14 @@ from pathlib import Path
 
 import numpy as np
 from kincheck.core.case.case import Case
-from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
 from kincheck.core.errors import KincheckError
 from kincheck.core.extensions.trees import case as trees
 from kincheck.core.extensions.trees.assembly import Assembled
 from kincheck.core.extensions.trees.driving import Driving
+from kincheck.core.extensions.trees.reader import read_tree
 from kincheck.core.kinematics import NativeSolver
 
 from .mujoco_newton import MujocoNewton

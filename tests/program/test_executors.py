@@ -16,9 +16,9 @@ from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import follow_samples, marcher
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import NODES, NumpyExecutor, Plan, Tape, absolute, before, program
-from kincheck.core.program.llvm.compiler import available
 from kincheck.core.program.llvm.executor import LlvmExecutor
 from kincheck.core.program.llvm.jit import OFTEN, LlvmCode
+from kincheck.core.program.llvm.machine_code import available
 from kincheck.core.program.llvm.plan import TOGETHER, PlanInMemory, in_order
 
 from ..support.mechanisms import four_bar, mcpherson, slider_crank

@@ -25,6 +25,6 @@ def visit(browser, tmp_path):
     def opened(run, act, **further):
         write_report(run, file := tmp_path / "report.html", **further)
         browser.visit(file.as_uri())
-        return browser.run(f"await pause(1000); {act}")
+        return browser.run(f"await settled(); {act}")
 
     return opened

@@ -39,5 +39,5 @@ def bench_page(file):
 def test_report_pages_pass_axe(written, browser, tmp_path):
     written(file := tmp_path / "page.html")
     browser.visit(file.as_uri())
-    browser.run("all('details').forEach((each) => { each.open = true; }); await pause(500);")
+    browser.run("all('details').forEach((each) => { each.open = true; }); await settled();")
     assert browser.violations() == []

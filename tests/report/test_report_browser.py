@@ -160,7 +160,7 @@ def test_figures_zoom_and_save_in_browser(visit):
         HTMLAnchorElement.prototype.click = function () { name = this.download; };
         plot.parentElement.querySelector("[data-save]").click();
         one("section.case details:has(.plot)").open = true;
-        await pause(300);
+        await settled();
         const rates = all("[data-figure=case-0-0-velocity] .curve").map((each) => each.dataset.series);
         return { seen, pressed: one("button[data-series=one]").ariaPressed, whole, zoomed, again, offered, rates, name, file: await file };
         """,  # noqa: E501
@@ -262,7 +262,7 @@ def test_curves_are_saved_in_browser(visit):
         URL.createObjectURL = (blob) => { text = blob.text(); return whole(blob); };
         let name; HTMLAnchorElement.prototype.click = function () { name = this.download; };
         one("[data-curves]").click();
-        while (name === undefined) await pause();
+        await until(() => name !== undefined);
         return [name, await text];
         """,
     )

@@ -6,7 +6,7 @@ import io
 
 import pytest
 from kincheck.core.harness.record import Deviations, Seconds
-from kincheck.core.report.table import print_outputs
+from kincheck.core.report.table import print_outputs, print_table
 from msgspec.structs import replace
 
 from ..support.printed import Terminal, coloured
@@ -64,6 +64,19 @@ strut · one
 –: strut · native: half_track_change, wheelbase_change: acceleration: none
 –: strut · one: half_track_change, wheelbase_change: acceleration: none
 –: strut · one: bare: no reference
+strut · native: 1.2.3, projection, loop:
+python; 21 of 21 samples; residual
+3.21e-14; rank 17; dof 1; iterations
+321; us/sample 12.5; build 0.125 s;
+first 0.25 s; warm 0.0625 s; reference
+A. Uthor: Struts (strut.csv
+aaaaaaaaaaaa)
+strut · one: 1.2.3, projection, loop:
+python; 20 of 21 samples; rank 19; dof
+2; iterations 654; us/sample 1.23e5;
+build 0.5 s; first 1.5 s; warm 0.75 s;
+reference A. Uthor: Struts (strut.csv
+aaaaaaaaaaaa)
 strut  native: closed form (validated);
 one, two: closed form
   native
@@ -156,3 +169,15 @@ def test_terminal_marks_deviations_red(run, monkeypatch):
         "red": [*off, "fail", "6.0e-09", "1.2e+03"],
         "green": ["pass"],
     }
+
+
+@pytest.mark.parametrize(
+    ("time", "printed"), [(0.5071, "0.507"), (999.4, "999"), (999.6, "1000"), (1504.2, "1504")]
+)
+def test_table_times_have_three_digits(time, printed, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    whole = results()
+    timed = [replace(each, us_per_step=time) for each in whole.records[:1]]
+    print_table(replace(whole, records=timed), text := io.StringIO())
+    (line,) = (line for line in text.getvalue().splitlines() if line.startswith("strut "))
+    assert f" {printed} " in line

@@ -23,8 +23,8 @@ def test_scene_turns_and_plays_in_browser(visit):
         press(".", canvas); note("step");
         slider.value = 0; slider.dispatchEvent(new Event("input")); note("first");
         one("[data-view='y z']").click(); note("front");
-        press(" ", canvas); await pause(500); const playing = one("[data-act=play]").textContent;
-        press(" ", canvas); note("played"); const still = +slider.value; await pause(500);
+        press(" ", canvas); await until(() => +slider.value > 2); const playing = one("[data-act=play]").textContent;
+        press(" ", canvas); note("played"); const still = +slider.value; await pause(5 * FRAME_MS);
         one("[data-layer=names]").click(); note("no names");
         return { looks, playing, stopped: still === +slider.value, last: +slider.max };
         """,  # noqa: E501

@@ -42,8 +42,9 @@ USERS = {
     "rzeppa": "Rzeppa",
     "point_on_parabola": "PointOnParabola",
     "line_no_twist": "LineNoTwist",
+    "torus": "Torus",  # the first loops lock up
 }
-WITHOUT_EQUIVALENT = ("bowl", "point_on_parabola", "line_no_twist")
+WITHOUT_EQUIVALENT = ("bowl", "point_on_parabola", "line_no_twist", "torus")
 
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
@@ -75,6 +76,15 @@ def test_check_joint_passes_user_joints(few, in_folder, module):
         assert all(
             each.message in ("on the equivalent", "not installed") for each in verdicts.values()
         )
+
+
+def test_check_joint_locked_loops_unjudged(loops_only, in_folder, monkeypatch):
+    """All loops with the torus lock up before their sweep ends."""
+    monkeypatch.setattr("kincheck.core.studies.checks.joint_loops.HALVINGS", 0)
+    report = check_joint(load_joint("torus:Torus"))
+    assert report.passed, report
+    assert report["loop"].verdict is Verdict.SKIP
+    assert report["loop"].message.startswith("not judged, the loop of this check fails: ")
 
 
 def test_check_joint_loop_large_residual_fails(loops_only):

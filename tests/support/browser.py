@@ -29,6 +29,11 @@ HELPERS = """
   const all = (what) => [...document.querySelectorAll(what)], one = (what) => document.querySelector(what);
   const keydown = (key) => new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true });
   const press = (key, on = document.body) => on.dispatchEvent(keydown(key));
+  const until = async (found) => { while (!found()) await pause(20); };
+  // after two frames, sizes are observed and drawn
+  const painted = async () => { for (const _ of [0, 1]) await new Promise(requestAnimationFrame); };
+  const isSeen = (box) => { const { top, bottom } = box.getBoundingClientRect(); return bottom > top && bottom > 0 && top < innerHeight && !box.closest("details:not([open])"); };
+  const settled = async () => { await painted(); await until(() => !all(".plot:not([data-drawn])").some(isSeen)); await painted(); };
 """  # noqa: E501
 
 
@@ -101,6 +106,12 @@ class Browser:
         """Open a page and wait until it is ready."""
         self("Page.navigate", url=address)
         self.until("'ready' in document.documentElement.dataset")
+
+    def reload(self) -> None:
+        """Load the page again and wait until it is ready; the old one is ready, too."""
+        self.run("window.isOld = true")
+        self("Page.reload")
+        self.until("!window.isOld && 'ready' in document.documentElement.dataset")
 
     def until(self, condition: str, seconds: float = 90.0) -> None:
         """Wait for a condition in the page."""

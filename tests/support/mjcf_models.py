@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from kincheck.core.algebra import X, Y, Z
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
+from kincheck.core.extensions.trees.reader import read_tree
 
 from .model_poses import EXACT, near
 

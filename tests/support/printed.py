@@ -62,10 +62,10 @@ def coloured(text: str) -> dict[str, list[str]]:
 
 
 def junit_tests(text: bytes | str) -> dict[str, list[tuple[str, str]]]:
-    """Return what the test cases of a JUnit file have, by class and name: kinds with messages."""
+    """Return the verdicts of the test cases of a JUnit file with messages, by class and name."""
     return {
         f"{test.get('classname')} {test.get('name')}": [
-            (child.tag, child.get("message", "")) for child in test
+            (child.tag, child.get("message", "")) for child in test if child.tag != "system-out"
         ]
         for test in ET.fromstring(text).iter("testcase")
     }

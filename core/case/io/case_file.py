@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...errors import CaseError, MechanismError, SolveError, unknown
-from ...extensions.hardpoints.suspension_section import read_suspension, suspension_lines
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
-from .document import LONGEST_TEXT, Section, explained, fault, read_tables, shown, toml_table
+from .document import LONGEST_TEXT, Section, explained, fault, read_tables, shown
 from .mechanism_sections import (
     free_lines,
     mechanism_lines,
@@ -26,11 +25,13 @@ from .mechanism_sections import (
     sweep_lines,
     values_in_file,
 )
-from .outputs import output_lines, read_output, with_all_coordinates, with_slopes
+from .outputs import output_lines, read_output, with_all_coordinates
+from .readers import LARGEST_FILE
 from .reference import read_reference, reason_against, reference_lines
-from .schema import SCHEMA, CaseKeys, ClosureKeys, ReferenceKeys, UnitsKeys
+from .schema import SCHEMA, ClosureKeys, ReferenceKeys, UnitsKeys
+from .sections import case_keys, sections
+from .toml_text import toml_table
 
-LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
 MOST_PARTS = 60_000
 _PARTS = ("bodies", "joints", "couplers", "points", "drivers", "forces", "outputs")
@@ -51,7 +52,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     file = Path(path)
     advice = "a case holds hardpoints; samples belong into a reference file"
     root = Section(file, "", _with_free(read_tables(file, LARGEST_FILE, advice, SCHEMA)))
-    keys = root.typed(CaseKeys)
+    keys = root.typed(case_keys())
     for what in _PARTS:
         if (count := len(getattr(keys, what))) > MOST_PARTS:
             raise root.at(what).fault(
@@ -102,7 +103,8 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
             f"found {found} beside a [reference], expected where that comes from; give one of"
             f" {kinds}"
         )
-    convention = str(root.at("suspension").at("convention").value or "")
+    conventions = (each.convention(root.at(each.key)) for each in sections())
+    convention = next(filter(None, conventions), "")
     case = replace(case, truth=keys.truth)
     return read_reference(file, columns, driver, units, case, convention, own_grid=own_grid)
 
@@ -144,17 +146,17 @@ def _with_outputs(root: Section, case: Case) -> Case:
             "found no point, expected one whose motion is compared; add [points.NAME], or an output"
             " of a joint or body, [outputs.NAME]"
         )
-    table = None
-    if root.at("suspension").value is not None:
-        table = read_suspension(root.at("suspension"), case)
-        wheels = tuple(each for each in (table.vehicle, table.other) if each)
-        case = replace(case, wheels=wheels)
+    tables: dict[str, Any] = {}
+    for each in sections():
+        if root.at(each.key).value is not None:
+            case, tables[each.key] = each.read(root.at(each.key), case)
     named = root.at("outputs").each()
-    outputs = tuple(read_output(name, section, table, case) for name, section in named)
+    outputs = tuple(read_output(name, section, tables, case) for name, section in named)
     outputs = outputs or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(case.mechanism, outputs), outputs=outputs)
-    slopes = table is not None and table.per_travel
-    return replace(case, outputs=with_slopes(outputs, size(case))) if slopes else case
+    for each in sections():
+        outputs = tuple(each.with_derived(outputs, tables.get(each.key), size(case)))
+    return replace(case, outputs=outputs)
 
 
 def case_text(case: Case, comments: Sequence[str] = ()) -> str:
@@ -193,7 +195,8 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         given = {f.name: getattr(case.rig, f.name) for f in fields(case.rig)}
         given = {key: value for key, value in given.items() if value is not None}
         lines += toml_table(given, "compliance")
-    lines += suspension_lines(case)
+    for each in sections():
+        lines += each.lines(case)
     lines += output_lines(case)
     return "\n".join([*lines, *reference]) + "\n"
 

@@ -12,31 +12,29 @@ from typing import Any, TypeAlias, TypeVar, cast
 import msgspec
 
 from ...errors import MechanismError
-from ...extensions.hardpoints.suspension import SuspensionOutput
 from ...joints import Coupler, Joint
 from ...mechanism.body import dimension_of
 from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper
 from ...mechanism.motions import Motion
 from ..joint_probe import specimen
 from ..measures import Measure, key_of
-from ..quantity import own_keys
+from ..quantity import TypedQuantity, own_keys
 from .mechanism_sections import DRIVERS, RestingKeys, RigKeys
 from .schema import (
     COORDINATE,
     SCHEMA,
     BodyKeys,
-    CaseKeys,
     ClosureKeys,
     FreeKeys,
     OutputKeys,
     PointKeys,
     ReferenceKeys,
-    SuspensionKeys,
     SweepKeys,
     UnitsKeys,
     keys_of,
     own_fields,
 )
+from .sections import case_keys, sections, types
 
 _SENTENCES = re.compile(r"(?<=[^.]\.) (?=[A-Z])")
 """The end of a sentence."""
@@ -48,10 +46,6 @@ ON_TYPES = (
     "points and directions are [x, y, z], global, at the design; of points and axes there is one on"
     " each body",
     "keys in brackets may be left out; body i is the first, j the second",
-)
-ON_OUTPUTS = (
-    "each with its derivative by wheel travel, jounce: NAME.per_travel [unit/m]; the table"
-    " [suspension] says of which wheel"
 )
 """Remarks on the tables."""
 
@@ -65,7 +59,7 @@ def catalogue() -> Iterator[str]:
 def output_catalogue() -> Iterator[str]:
     """Yield lines of the output types: unit, keys, needs from [suspension], and signs."""
     yield from _table_lines(output_tables())
-    yield ON_OUTPUTS
+    yield from on_outputs()
 
 
 def type_tables() -> dict[str, Rows]:
@@ -97,21 +91,26 @@ def output_tables() -> dict[str, Rows]:
     sign and needs.
     """
 
-    def keys(cls: type[Measure | SuspensionOutput]) -> str:
+    def keys(cls: type[TypedQuantity]) -> str:
         named = ((key_of(each), each.default) for each in own_keys(cls))
         return ", ".join(key if default is MISSING else f"({key})" for key, default in named)
 
-    rows: Rows = []
-    for name, cls in sorted(SuspensionOutput.registry.items()):
+    def row(name: str, cls: type[TypedQuantity]) -> tuple[str, ...]:
         needs = f"needs {', '.join(cls.needs)}" if cls.needs else ""
-        rows.append((name, f"[{cls.measure}]", keys(cls), f"positive: {cls.positive}", needs))
+        return name, f"[{cls.measure}]", keys(cls), f"positive: {cls.positive}", needs
+
     of_all = (
         "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and"
     )
     return {
         of_all: _rows(Measure.registry, lambda cls: (keys(cls),)),
-        "outputs of a wheel: type, and": rows,
+        **{each.heading: [row(*one) for one in sorted(each.types.items())] for each in sections()},
     }
+
+
+def on_outputs() -> list[str]:
+    """Return the remarks on the output types of extensions."""
+    return [each.remark for each in sections() if each.remark]
 
 
 def _rows(
@@ -179,7 +178,7 @@ TEMPLATE = "#/$defs/{name}"
 
 def case_schema() -> dict[str, Any]:
     """Return the schema of case files, with all joint types registered so far."""
-    measures, outputs = map(_structs, (Measure.registry, SuspensionOutput.registry))
+    measures, outputs = map(_structs, (Measure.registry, types()))
     tables: Tables = {
         "bodies": BodyKeys,
         "joints": _structs({**Joint.registry, **Coupler.registry}),
@@ -194,13 +193,13 @@ def case_schema() -> dict[str, Any]:
         "closure": ClosureKeys,
         "sweep": SweepKeys,
         "free": FreeKeys,
-        "suspension": SuspensionKeys,
+        **{each.key: each.keys for each in sections()},
         "reference": ReferenceKeys,
         "compliance": RigKeys,
         "equilibrium": RestingKeys,
     }
     motions = _structs(Motion.registry)
-    found = document_schema(SCHEMA, CaseKeys, tables, single, {"motion": motions})
+    found = document_schema(SCHEMA, case_keys(), tables, single, {"motion": motions})
     for name in DRIVERS:
         keys = found["$defs"][f"drivers.{name}"]["properties"]
         keys["motion"] = any_of([f"motion.{name}" for name in motions])

@@ -14,16 +14,16 @@ import re
 import reprlib
 import tomllib
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
 import msgspec
 
-from ...errors import LONGEST_NAME, CaseError, MechanismError, brief, remedy, similar, with_article
+from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy, similar, with_article
 from ..units import METRE, FileUnits, Unit
 from .escape import visible
 from .foreign import binary, foreign
@@ -256,16 +256,7 @@ def parse(file: Path, text: str) -> dict[str, Any]:
             f"line {line}",
             f"found a key nested more than {DEEPEST} deep, expected two or three parts; correct it",
         )
-    try:
-        data = json.loads(text, object_pairs_hook=_once) if is_json else tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-        problem = f"not valid {'JSON' if is_json else 'TOML'}: {what}; correct the syntax"
-        if what.startswith(_TOO_MANY_DIGITS):
-            problem = (
-                "found an integer of thousands of digits, expected numbers of a size; correct it"
-            )
-        raise fault(file, "", problem) from None
+    data = parse_json(file, text) if is_json else _loaded(file, "TOML", tomllib.loads, text)
     if not isinstance(data, dict):
         raise fault(
             file, "", f"found {shown(data)}, expected the keys of a case; write an object {{...}}"
@@ -273,6 +264,31 @@ def parse(file: Path, text: str) -> dict[str, Any]:
     tables = cast("dict[str, Any]", data)
     check_values(file, tables)
     return tables
+
+
+def parse_json(file: Path, text: str, **hooks: Callable[[str], object]) -> Any:
+    """Return the value of a JSON text.
+
+    Args:
+        hooks: of `json.loads`, to read numbers in another way.
+
+    Raises:
+        CaseError: the syntax is wrong, or a key is given twice.
+    """
+    return _loaded(file, "JSON", partial(json.loads, object_pairs_hook=_once, **hooks), text)
+
+
+def _loaded(file: Path, kind: str, load: Callable[[str], Any], text: str) -> Any:
+    try:
+        return load(text)
+    except (ValueError, RecursionError) as error:
+        what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        problem = f"not valid {kind}: {what}; correct the syntax"
+        if what.startswith(_TOO_MANY_DIGITS):
+            problem = (
+                "found an integer of thousands of digits, expected numbers of a size; correct it"
+            )
+        raise fault(file, "", problem) from None
 
 
 def _blank(found: re.Match[str]) -> str:
@@ -388,8 +404,13 @@ class Section:
         return Section(self.file, join(self.key, name), self._entries.get(name), self.units)
 
     def each(self) -> Iterator[tuple[str, Section]]:
-        """Yield names and values of this table; nothing without it."""
-        return ((name, self.at(name)) for name in self._entries)
+        """Yield names and values of this table; nothing without it.
+
+        Raises:
+            CaseError: the value is no table.
+        """
+        if self.value is not None:
+            yield from ((name, self.at(name)) for name in self.table)
 
     def fault(self, problem: str) -> CaseError:
         """Return the error of this value; see `fault`."""
@@ -406,6 +427,24 @@ class Section:
     def require(self, name: str | None, known: Iterable[str], expected: str) -> None:
         """Refuse a name here that is none of the known ones; see `require_known`."""
         require_known(self.file, self.key, name, known, expected)
+
+    def require_keys(self, known: Iterable[str]) -> None:
+        """Refuse unread keys of this table: almost always misspelt ones.
+
+        Raises:
+            CaseError: the value is no table, or has such a key.
+        """
+        known = [*known]
+        for name in self.table:
+            if name not in known:
+                close = similar(name, known)
+                further = not self.key and isinstance(self.table[name], dict)
+                remove = f"remove it{', or install the extension that reads it' * further}"
+                advice = f"did you mean {close!r}?" if close else remove
+                raise self.at(name).fault(
+                    f"unknown key, expected {'one of ' * (len(known) > 1)}{', '.join(known)};"
+                    f" {advice}"
+                )
 
     @property
     def table(self) -> dict[str, Any]:
@@ -452,14 +491,9 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
         CaseError: not a table, an unknown key, a missing key, or a value of another type or shape
             than described.
     """
-    table = Section(file, key, value).table
-    fields = _fields(struct)
-    for name in table:
-        if name not in fields:
-            close = similar(name, fields)
-            advice = f"did you mean {close!r}?" if close else "remove it"
-            problem = f"unknown key, expected one of {', '.join(fields)}; {advice}"
-            raise fault(file, join(key, name), problem)
+    section, fields = Section(file, key, value), _fields(struct)
+    section.require_keys(fields)
+    table = section.table
     for name, field in fields.items():
         if field.required and name not in table:
             raise fault(
@@ -494,88 +528,3 @@ def description(annotation: Any) -> str:
         if get_origin(part) is Annotated:  # of Annotated[...] | None
             return description(part)
     raise TypeError(f"{annotation} has no description")
-
-
-INSTALL = "pip install 'kincheck[yaml]'"
-# The parser takes seconds for a megabyte; geometry and lists of joints are some kilobytes.
-LONGEST = 500_000
-
-
-def parse_yaml(file: Path, text: str) -> Any:
-    """Return the data of a YAML text.
-
-    Raises:
-        CaseError: PyYAML is missing, or the text is not valid or too long.
-    """
-    try:
-        import yaml
-    except ImportError:
-        raise fault(
-            file, "", f"needs PyYAML, which is not installed; {INSTALL}, or move the file away"
-        ) from None
-    if len(text) > LONGEST:
-        raise fault(
-            file,
-            "",
-            f"found {len(text)} characters, expected {LONGEST} at most; take out what is not"
-            " geometry",
-        )
-
-    class Plain(yaml.BaseLoader):
-        """Makes texts of all scalars, and refuses references, which can multiply without end."""
-
-        def compose_node(self, parent: Any, index: Any) -> Any:
-            if self.check_event(yaml.AliasEvent):  # pyright: ignore[reportUnknownMemberType]
-                raise yaml.YAMLError("found a reference (*NAME), expected none")
-            return super().compose_node(parent, index)
-
-        def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-            keys = [key.value for key, _ in node.value if isinstance(key.value, str)]
-            if len(set(keys)) < len(keys):
-                twice = next(key for k, key in enumerate(keys) if key in keys[:k])
-                raise yaml.YAMLError(f"the key {shown(twice)} is given twice")
-            return super().construct_mapping(node, deep)
-
-    try:
-        data: Any = yaml.load(text, Plain)
-        check_values(file, {"content": data})
-        return data
-    except RecursionError:
-        what = "nested too deeply"
-    except (yaml.YAMLError, ValueError) as error:
-        what = " ".join(str(error).split())
-    raise fault(file, "", f"not valid YAML: {what}; correct the syntax") from None
-
-
-def toml_table(values: Mapping[str, Any], *path: str) -> list[str]:
-    """Return the lines of a table of a TOML file, with a heading if it has a path.
-
-    Raises:
-        CaseError: a name of the path is not one that a file can hold.
-    """
-    heading = ["", f"[{'.'.join(map(_toml_key, path))}]"] if path else []
-    return [*heading, *(f"{key} = {_toml_value(value)}" for key, value in values.items())]
-
-
-def _toml_key(name: str) -> str:
-    """Return a name as a key, without quotes if TOML allows it."""
-    if not (name and name.isprintable() and len(name) <= LONGEST_NAME):
-        raise CaseError(
-            f"name {brief(name)!r}: found {len(name)} characters, expected 1 to {LONGEST_NAME}"
-            " printable ones, which a case file can hold; rename it"
-        )
-    bare = name.replace("_", "a").replace("-", "a").isalnum() and name.isascii()
-    return name if bare else json.dumps(name)
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)  # a JSON string is a basic string of TOML
-    if isinstance(value, tuple | list):
-        return f"[{', '.join(map(_toml_value, cast('Sequence[Any]', value)))}]"
-    if isinstance(value, int):
-        return repr(value)
-    # the reader refuses smaller numbers; they are the round-off of zeros
-    return repr(float(value) if abs(value) >= SMALLEST else 0.0)

@@ -86,6 +86,22 @@ def members(data: bytes) -> int:
     return data.count(_MEMBER)
 
 
+def too_large(data: bytes, most: int) -> str:
+    """Return why an archive would take too much memory or room, as an attack would; empty if not.
+
+    Args:
+        most: largest size of all members together when unpacked.
+
+    Raises:
+        BadZipFile, ValueError, NotImplementedError, OSError, EOFError: it is damaged.
+    """
+    if (count := members(data)) > MOST_MEMBERS:
+        return f"has {count} parts, expected {MOST_MEMBERS} at most"
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        size = sum(each.file_size for each in archive.infolist())
+    return f"unpacks to {size} bytes, expected {most} at most" if size > most else ""
+
+
 def _archive(data: bytes) -> tuple[str, str]:
     """Return the kind of an archive by the names inside it, and the remedy; if damaged, the kind is
     "archive".

@@ -32,7 +32,7 @@ from ...mechanism.motions import (
 from ...trajectory import Array
 from ..case import MARKER, SLOW, TIME, Case, Free, Load, Resting, Rig, Sweep
 from ..units import RADIAN, SECOND, FileUnits, Unit, plain
-from .document import Section, explained, parse, read_text, shown, toml_table
+from .document import Section, explained, parse, read_text, shown
 from .reference import read_grid
 from .schema import (
     MOST_SAMPLES,
@@ -47,6 +47,7 @@ from .schema import (
     keys_of,
     own_fields,
 )
+from .toml_text import toml_table
 
 DRIVERS: Mapping[str, type[Driver]] = {
     cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)
@@ -476,15 +477,22 @@ def sweep_lines(case: Case, values: Array, *, own_grid: bool) -> list[str]:
     return toml_table({"driver": sweep.driver, **grid, **rate}, "sweep")
 
 
-def bushings_in(file: Path) -> Section:
+def bushings_in(file: Path, *tables: str) -> Section:
     """Return the tables of a file of bushings.
 
+    Args:
+        tables: names of its tables.
+
     Raises:
-        CaseError: the file cannot be read.
+        CaseError: the file cannot be read, or has other tables or keys.
     """
     text = read_text(file, LARGEST, "it holds the bushings of one suspension")
     try:
-        return Section(file, "", parse(file, text))
+        root = Section(file, "", parse(file, text))
+        root.require_keys(tables)
+        for _, joint in root.at("joints").each():
+            joint.require_keys(("bushings",))
+        return root
     except CaseError as error:
         raise CaseError(
             f"{error}; --bushings takes TOML, [bushings.ROLE] as kincheck templates NAME --bushings"
@@ -492,14 +500,17 @@ def bushings_in(file: Path) -> Section:
         ) from None
 
 
-def with_bushings(case: Case, file: Path) -> Case:
+def with_bushings(case: Case, file: Path, *tables: str) -> Case:
     """Return a case with the bushings in a file of tables [joints.NAME.bushings.X], in SI units,
     beside its own: tables of hardpoints have none.
+
+    Args:
+        tables: names of other tables of the file.
 
     Raises:
         CaseError: the file cannot be read, or names an unknown joint.
     """
-    root, joints = bushings_in(file), case.mechanism.given_joints
+    root, joints = bushings_in(file, "joints", *tables), case.mechanism.given_joints
     names = [joint.name for joint in joints]
     for name, section in root.at("joints").each():
         section.require(name, names, "a joint")

@@ -1,5 +1,5 @@
-"""[outputs.NAME] of a case file, read and written: coordinates of points, measures and suspension
-outputs; their tolerances; and the outputs of a case whose file names none.
+"""[outputs.NAME] of a case file, read and written: coordinates of points, measures, and types of
+extensions; their tolerances; and the outputs of a case whose file names none.
 """
 
 from __future__ import annotations
@@ -12,23 +12,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import CaseError
-from ...extensions.hardpoints.suspension import (
-    AxleOutput,
-    PerTravel,
-    Rate,
-    Side,
-    SuspensionOutput,
-    Vehicle,
-)
-from ...extensions.hardpoints.suspension.base import WheelOutput
-from ...extensions.hardpoints.suspension_section import (
-    SuspensionTable,
-    check_point,
-    direction,
-    wheels_of,
-)
 from ...mechanism.loads import Bushing, ForceElement, Torque, TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism
+from ...mechanism.mechanism import Mechanism, Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, pace, size
 from ..measures import (
     Component,
@@ -39,11 +24,13 @@ from ..measures import (
     Orientation,
     key_of,
 )
-from ..quantity import AXES, own_keys, with_markers
+from ..quantity import AXES, Derived, TypedQuantity, own_keys, with_markers
 from ..units import Convert
-from .document import Section, explained, shown, toml_table
+from .document import Section, explained
 from .reference_samples import RATES
 from .schema import COORDINATE, OutputKeys, ToleranceKeys, keys_of
+from .sections import sections, types
+from .toml_text import toml_table
 
 # Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized
 # mechanisms at 1e-16 m.
@@ -97,7 +84,7 @@ def default(size: float, unit: str = "m") -> tuple[float, float, str]:
     )
 
 
-def _tolerance(
+def tolerance(
     section: Section, keys: ToleranceKeys, convert: Convert, size: float, unit: str = "m"
 ) -> tuple[float, float, str]:
     """Return atol [unit], rtol [-] and their reason.
@@ -167,11 +154,11 @@ def with_all_motions(case: Case, at_design: Mapping[str, float] | None = None) -
     return replace(case, mechanism=with_markers(mechanism, outputs), outputs=tuple(outputs))
 
 
-def read_output(name: str, section: Section, table: SuspensionTable | None, case: Case) -> Quantity:
+def read_output(name: str, section: Section, tables: Mapping[str, Any], case: Case) -> Quantity:
     """Return an output that the file names.
 
     Args:
-        table: the table [suspension], if there is one.
+        tables: those that extensions have read, by key.
         case: the case read so far.
 
     Raises:
@@ -184,12 +171,13 @@ def read_output(name: str, section: Section, table: SuspensionTable | None, case
             " name"
         )
     if section.table.get("type", COORDINATE) != COORDINATE:
-        known = {COORDINATE: Output, **Measure.registry, **SuspensionOutput.registry}
+        known = {COORDINATE: Output, **Measure.registry, **types()}
         cls = section.class_of("output", known)
         if issubclass(cls, Measure):
             return _measure(name, section, cls, case)
-        if issubclass(cls, SuspensionOutput):
-            return _of_wheel(name, section, cls, table, case)
+        for each in sections():
+            if its := each.types.get(section.table["type"]):
+                return each.output(name, section, its, tables.get(each.key), case)
     keys = section.typed(OutputKeys)
     check_point(section.at("point"), keys.point, case.mechanism)
     match keys.component, keys.direction:
@@ -203,8 +191,30 @@ def read_output(name: str, section: Section, table: SuspensionTable | None, case
                 f'found {what} direction, expected one of them; give component = "x" or direction ='
                 " [x, y, z]"
             )
-    given = _tolerance(section, keys, section.units.length, size(case))
+    given = tolerance(section, keys, section.units.length, size(case))
     return Output(name, keys.point, along, keys.relative, *given)
+
+
+def direction(section: Section, found: Sequence[float]) -> Vector:
+    """Return the unit vector of a direction of a file.
+
+    Raises:
+        CaseError: it is zero.
+    """
+    if not any(found):
+        raise section.fault("found zero, expected a direction; give one of any other length")
+    length = math.hypot(*found)
+    x, y, z = found
+    return x / length, y / length, z / length
+
+
+def check_point(section: Section, name: str, mechanism: Mechanism) -> None:
+    """Refuse a name without a point.
+
+    Raises:
+        CaseError: there is no such point.
+    """
+    section.require(name, [point.name for point in mechanism.points], "a point")
 
 
 def _measure(name: str, section: Section, cls: type[Measure], case: Case) -> Measure:
@@ -219,7 +229,7 @@ def _measure(name: str, section: Section, cls: type[Measure], case: Case) -> Mea
         loads = largest_load(case.mechanism, scale, pace(case))
         scale = loads * scale if output.turns else loads
     _, convert = section.units.of(output.unit)
-    atol, rtol, why = _tolerance(section, keys, convert, scale, output.unit)
+    atol, rtol, why = tolerance(section, keys, convert, scale, output.unit)
     if isinstance(output, JointAngle | JointDisplacement):
         output = replace(output, at_design=convert(output.at_design))
     return replace(output, atol=atol, rtol=rtol, why=why)
@@ -256,74 +266,6 @@ def largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
     return total
 
 
-def _of_wheel(
-    name: str,
-    section: Section,
-    cls: type[SuspensionOutput],
-    table: SuspensionTable | None,
-    case: Case,
-) -> SuspensionOutput:
-    suspension = Section(section.file, "suspension", None)
-    what = f"for {section.key} of type {cls.type!r}"
-    if table is None:
-        raise suspension.fault(f"missing, expected a table {what}; add [suspension]")
-    keys: Any = section.typed(keys_of(cls))
-    if issubclass(cls, AxleOutput) and table.other is None:
-        raise suspension.at("other").fault(
-            f"missing, expected the other wheel {what}; add [suspension.other]"
-        )
-    vehicle = _wheel(section, table, getattr(keys, "side", None))
-    for need in cls.needs:
-        if getattr(vehicle, need) is None:
-            raise suspension.at(need).fault(f"missing, expected it {what}; add it")
-    given: dict[str, Any] = {each.name: getattr(keys, each.name) for each in own_keys(cls)}
-    if issubclass(cls, AxleOutput):
-        given["other"] = table.other
-    _, convert = section.units.of(cls.measure)
-    tolerance = _tolerance(section, keys, convert, size(case), cls.measure)
-    output = cls(name, vehicle, *tolerance, **given)
-    if problem := output.problem:
-        raise section.fault(problem)
-    for each in own_keys(cls):
-        value = given[each.name]
-        names: tuple[str, ...] = (value,) if type(value) is str else value  # of points
-        for point in names if isinstance(names, tuple) else ():  # pyright: ignore[reportUnnecessaryIsInstance]
-            check_point(section.at(each.name), point, case.mechanism)
-    moving = [*case.sweep.path.motions]
-    if isinstance(output, Rate) and len(moving) > 1 and not output.vehicle.travel:
-        raise section.at("type").fault(
-            f"found {output.type!r} while {', '.join(moving)} move, expected one of them to be the"
-            " wheel's travel, for it is a derivative by that; name it by suspension.travel"
-        )
-    return output
-
-
-def _wheel(section: Section, table: SuspensionTable, side: Side | None) -> Vehicle:
-    """Return the vehicle with the wheel of an output."""
-    for wheel in filter(None, (table.vehicle, table.other)):
-        if side in (None, wheel.side):
-            return wheel
-    raise section.at("side").fault(
-        f"found {shown(str(side))}, expected {table.vehicle.side}, the side in [suspension];"
-        " correct it, or add [suspension.other]"
-    )
-
-
-def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...]:
-    """Return the outputs, each output of a wheel followed by its derivative by travel.
-
-    Args:
-        size: size of the mechanism [m]. If a pose error changes an output by d, it changes the
-            slope by about d / size.
-    """
-    both = list[Quantity]()
-    for output in outputs:
-        both.append(output)
-        if isinstance(output, SuspensionOutput) and not isinstance(output, AxleOutput):
-            both.append(PerTravel(output, output.atol / size))
-    return tuple(both)
-
-
 def output_lines(case: Case) -> Iterator[str]:
     """Yield the lines of the outputs of a case, in SI units.
 
@@ -331,17 +273,17 @@ def output_lines(case: Case) -> Iterator[str]:
         CaseError: an output is one that a case file cannot name.
     """
     for output in case.outputs:
-        if not isinstance(output, PerTravel):  # the reader derives it from the output before it
+        if not isinstance(output, Derived):  # the reader derives it from the output before it
             keys = dict(_keys(case, output))
             given = {"atol": output.atol, "rtol": output.rtol, "why": output.why}
             yield from toml_table({**keys, **given}, "outputs", output.name)
 
 
 def _keys(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
-    if isinstance(output, Measure | SuspensionOutput):
+    if isinstance(output, TypedQuantity):
         yield "type", output.type
-        if isinstance(output, WheelOutput) and len(wheels_of(case)) > 1:
-            yield "side", output.vehicle.side
+        for each in sections():
+            yield from each.further(case, output)
         for each in own_keys(type(output)):
             value = getattr(output, each.name)
             if value is not None and value != each.metadata.get("unless"):

@@ -2,176 +2,49 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, make_dataclass
 from functools import partial
-from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from ...options import flags_of, option, option_fields, positive, switch
+from ...errors import KincheckError
+from ...options import flags_of, option, option_fields, switch
+from .readers import CaseOptions, readers
 
-HARDPOINTS, MODELS, CURVES = "hardpoints", "models", "measured curves"
-_hardpoints, _models, _curves = (
-    partial(option, heading=heading) for heading in (HARDPOINTS, MODELS, CURVES)
-)
+CURVES = "measured curves"
+_curves = partial(option, heading=CURVES)
 
 
-@dataclass(frozen=True)
-class Supplied:
-    """Options of the readers of foreign files, as typed; the readers check them.
+def _options_of_all() -> Any:
+    """Return a data class with the options of all readers.
 
-    Attributes:
-        recorded: whether a recording is there, whose motion a dataset without its own follows.
-        bushings: file of the bushings of hardpoints.
+    Raises:
+        KincheckError: two of them have an option of the same name.
+    """
+    kinds = dict.fromkeys([CaseOptions, *(each.options for each in readers())])
+    whole = [kind for kind in kinds if not any(kind in other.__mro__[1:] for other in kinds)]
+    every = {base for each in whole for base in each.__mro__}
+    declared = Counter(name for each in every for name in vars(each).get("__annotations__", ()))
+    for each, *_ in (found for kind in whole for found in option_fields(kind)):
+        if declared[each.name] > 1:
+            raise KincheckError(
+                f"{declared[each.name]} readers have an option {each.name!r} of their own. Rename"
+                " that of the one that you installed, or uninstall it."
+            )
+    return make_dataclass("_Options", (), bases=tuple(whole[::-1]), frozen=True)
+
+
+_Options = _options_of_all()
+
+
+class Supplied(_Options):  # pyright: ignore[reportUntypedBaseClass]
+    """Options of the readers of foreign files, as typed; the readers check them: all options of
+    all readers, as `kincheck import --help` lists them.
     """
 
-    HEADINGS: ClassVar[Mapping[str, str]] = {
-        HARDPOINTS: (
-            "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv, .xlsx), trees"
-            " (.yaml, .json) and scripts (.m)."
-        ),
-        MODELS: (
-            "Models (MJCF, URDF, SDF, USD, OpenSim), which do not state drivers, and datasets of"
-            " Adams (.adm)."
-        ),
-    }
 
-    template: str | None = _hardpoints(
-        "type of suspension, if the file does not state it; kincheck templates prints them",
-        metavar="NAME",
-    )
-    units: str | None = _hardpoints(
-        "unit of the coordinates, such as mm or m, if the file does not state it",
-        metavar="UNIT",
-    )
-    axes: str | None = _hardpoints(
-        "directions of x, y and z, if the file does not state them: forward,left,up or"
-        " rearward,right,up, ...",
-        metavar="X,Y,Z",
-    )
-    travel: str | None = _hardpoints(
-        "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive"
-        " up: --travel=-40:120mm:33; in metres without a unit",
-        metavar="M[:SAMPLES]",
-    )
-    side: str | None = _hardpoints(
-        "side of the wheel, left or right; without it, the side follows from the points",
-        metavar="SIDE",
-    )
-    names: Path | None = _hardpoints(  # noqa: RUF009
-        'names of the points in the file: TOML, with a line ROLE = "NAME" for each; a new FILE'
-        " is written",
-        Path,
-        metavar="FILE",
-    )
-    ask_names: bool = switch(
-        "refuse names that are only like those of the template, with a guess for each",
-        heading=HARDPOINTS,
-    )
-    wheel_radius: str | None = _hardpoints(
-        "radius of the loaded wheel, such as 300mm, if no point is its contact: for roll"
-        " centre, scrub radius and trail",
-        metavar="M",
-    )
-    wheelbase: str | None = _hardpoints(
-        "wheelbase [m], for Ackermann, turning circle and anti-values",
-        metavar="M",
-    )
-    rack_per_turn: str | None = _hardpoints(
-        "travel of the rack per turn of the steering wheel [m], for the steering ratio",
-        metavar="M",
-    )
-    axle: str | None = _hardpoints(
-        "motion of both wheels, the right one a mirror image of the left, and a rack: heave,"
-        " roll or steer, over --travel of the left wheel or of the rack",
-        metavar="MOTION",
-    )
-    rack: str | None = _hardpoints(
-        "travel of the rack while the wheel goes up, such as 20mm, positive to the left: -M to"
-        " M, or START:STOP; in metres without a unit",
-        metavar="M",
-    )
-    position: str | None = _hardpoints(
-        "axle, front or rear, for anti-values; with --wheelbase, --cg-height and a share",
-        metavar="AXLE",
-    )
-    cg_height: str | None = _hardpoints(
-        "height of the vehicle's centre of gravity above the road [m]",
-        metavar="M",
-    )
-    brake_share: str | None = _hardpoints(
-        "share of the braking force at this axle, 0 to 1",
-        metavar="X",
-    )
-    drive_share: str | None = _hardpoints(
-        "share of the driving force at this axle, 0 to 1",
-        metavar="X",
-    )
-    corner: str | None = _hardpoints(
-        "wheel of a table of the whole car: FL, FR, RL, RR, or in words",
-        metavar="NAME",
-    )
-    sheet: str | None = _hardpoints(
-        "sheet of a workbook with several tables, or section of a tree, such as front",
-        metavar="NAME",
-    )
-    drive: tuple[str, ...] = _models(
-        "a joint that moves, as qpos, in rad or m without a unit: knee:-30:30deg:61; several"
-        " move together",
-        metavar="JOINT:START:STOP[:SAMPLES]",
-        several="repeated",
-    )
-    hold: tuple[str, ...] = _models(
-        "joints or free bodies that do not move",
-        metavar="NAME",
-        several="together",
-    )
-    hold_rest: bool = switch(
-        "hold as many joints as needed: free bodies, joints with an actuator, others",
-        heading=MODELS,
-    )
-    without: tuple[str, ...] = _models(
-        "elements of a model to leave out, by tag, name or TAG/NAME, or statements of a dataset"
-        " of Adams, as BUSHING or BUSHING/3; a note beside every verdict says so",
-        metavar="NAME",
-        several="together",
-    )
-    start: tuple[str, ...] = _models(
-        "keyframe:NAME, or JOINT=VALUE, as qpos, in rad or m without a unit, instead of qpos0;"
-        " the start is assembled to close, and a note says by how far joints moved",
-        metavar="WHERE",
-        several="together",
-    )
-    closure: float | None = option(
-        "accept gaps up to X [m] that stem from rounded digits of the file: rows that are"
-        " redundant within X are left out; default: [closure] tolerance of a case file, else 0;"
-        " for a model, from its digits",
-        positive,
-        metavar="X",
-    )
-    recorded: bool = False
-    bushings: Path | None = None
-
-    @property
-    def given(self) -> list[str]:
-        """Names of the given options, as on the command line."""
-        values = (getattr(self, each.name) for each in fields(self))
-        named = zip(_NAMES, values, strict=True)
-        return [name for name, value in named if value and name not in _UNCHECKED]
-
-
-# not options of files of one kind
-_UNCHECKED = ("recorded", "bushings")
-_NAMES = tuple(each.name.replace("_", "-") for each in fields(Supplied))
-_CORNER = _NAMES.index("corner")
-OF_HARDPOINTS, OF_SEVERAL = _NAMES[:_CORNER], _NAMES[_CORNER : _CORNER + 2]
-"""Options of all hardpoints, and of files with those of several wheels."""
 NOTHING = Supplied()
-
-WITHOUT = "left out by --without: "
-"""Begin of the note on what the user leaves out of a model."""
-LEFT_OUT = "; left out: "
-"""Separator in the source of a case, before the list of omitted content of its file."""
 
 
 @dataclass(frozen=True)

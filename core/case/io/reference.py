@@ -26,16 +26,18 @@ from ...trajectory import QUANTITIES, Array
 from ..case import Case, Origin, Quantity, Series, Truth
 from ..curves import (
     FEWEST,
+    FEWEST_DIGITS,
     Printed,
     bound_rounding,
-    have_common_factor,
     interpolate,
     is_even_grid,
+    is_set,
     match_rows,
     slopes,
 )
 from ..units import Convert, FileUnits, Unit
-from .document import fault, shown, toml_table
+from .document import fault, shown
+from .readers import WORKBOOKS
 from .reference_file import SAME_GRID, read, series, sha256
 from .reference_samples import (
     RATES,
@@ -48,12 +50,10 @@ from .reference_samples import (
     samples_of,
 )
 from .schema import DIGEST, ReferenceKeys
-from .table import WORKBOOKS
+from .toml_text import toml_table
 
 PROVED = ".json"
 """Suffix of the files of proved references."""
-# Of the rows of a formula, those with fewer digits are not rounded.
-FEWEST_DIGITS = 4
 CHOICE = 'sheet = "NAME" in [reference]'
 
 
@@ -285,8 +285,10 @@ class Grid:
         self._allowed = allowed = SAME_GRID * float(np.max(np.abs(values)))
         self._index = np.arange(len(rows)) if own else match_rows(rows, values, allowed)
         self._full = any(printed.exact for printed in samples.printed[1:])
-        half = samples.printed[0].half(self._written) * abs(driver(1.0))
-        if (self._index is not None and not own) or self._is_set():
+        printed = samples.printed[0]
+        half = printed.half(self._written) * abs(driver(1.0))
+        set_ = printed.as_set or is_set(self._written, printed.half(self._written))
+        if (self._index is not None and not own) or set_:
             half = np.zeros_like(half)  # the driver values are exact as printed
         self._order = np.argsort(rows, kind="stable")
         self._x, self._half = rows[self._order], float(half.max())
@@ -294,15 +296,6 @@ class Grid:
         self._within = (values >= self._x[0] - slack) & (values <= self._x[-1] + slack)
         if self._index is None:
             self._check(driver, values)
-
-    def _is_set(self) -> bool:
-        """Return whether somebody set the driver values, so that they are not rounded."""
-        printed, values = self._samples.printed[0], self._written
-        return (
-            printed.as_set
-            or is_even_grid(values)
-            or have_common_factor(values, printed.decimals or 0)
-        )
 
     def _check(self, driver: Unit, values: Array) -> None:
         """Refuse rows unfit for interpolation."""

@@ -9,16 +9,16 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...errors import MOST_NAMED, brief, remedy, shortened
-from ...extensions.hardpoints.suspension import Convention, PerTravel, SuspensionOutput
 from ...trajectory import Array
 from ..case import TIME, Case, Origin, Quantity, Truth
+from ..quantity import Convention, TypedQuantity
 from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
 from .document import fault, number_or_nan, require_known, shown
 from .reader_options import CurveOptions
@@ -112,7 +112,7 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
 
 def _side(case: Case) -> str:
     """Return the side of the wheel of a case; left for an axle or a case without wheels."""
-    sides = {str(each.vehicle.side) for each in case.outputs if isinstance(each, SuspensionOutput)}
+    sides = {each.side for each in case.outputs if isinstance(each, TypedQuantity) and each.side}
     return "right" if sides == {"right"} else "left"
 
 
@@ -205,8 +205,9 @@ def _with_accuracy(
     why = f"the accuracy of {file.name}, as its user states it"
     found: list[Any] = [*outputs]
     for k, output in enumerate(found):
-        if output.name in stated:  # a slope has the other tolerances of its output
-            rest = {} if isinstance(output, PerTravel) else {"rtol": 0.0, "why": why}
+        if output.name in stated:  # what is derived has the other tolerances of its output
+            own = [each.name for each in fields(output)]
+            rest = {"rtol": 0.0, "why": why} if "rtol" in own else {}
             found[k] = replace(output, atol=stated[output.name], **rest)
     return tuple(found)
 

@@ -26,11 +26,11 @@ from ..case import PER_TRAVEL, Quantity
 from ..curves import Printed
 from ..units import Convert, FileUnits, Unit, si_of
 from .document import LARGEST, SMALLEST, fault, number_or_nan, read_text, shown
+from .readers import WORKBOOKS
 from .schema import ReferenceKeys
 from .table import (
     DELIMITERS,
     LARGEST_FILE,
-    WORKBOOKS,
     Cell,
     Table,
     find_decimal_sign,
@@ -257,6 +257,7 @@ def samples_of(
         # convert at once: the cells of a large file as texts would take many times its size
         for column, n in zip(printed, wanted, strict=True):
             if gaps and str(cells[n]).lower().lstrip("+-") in ("", "nan"):
+                column.add("")
                 numbers.append(math.nan)
                 continue
             text = numeral(cells[n], sign)

@@ -189,22 +189,14 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args, get_type_hints
 import msgspec
 from msgspec import Meta
 
-from ...extensions.hardpoints.suspension import (
-    Axle,
-    AxleOutput,
-    Convention,
-    Reaction,
-    Side,
-    SuspensionOutput,
-)
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.body import ANGLE, SIX_NUMBERS, Inertia, dimension_of
 from ...mechanism.loads import Axes, Bushing, ForceElement, SpringDamper, dimensions_of
 from ...mechanism.mechanism import Vector
 from ...mechanism.motions import Driver, Motion
 from ..case import TIME, Truth
-from ..measures import NAMES, Measure, key_of
-from ..quantity import own_keys
+from ..measures import NAMES, key_of
+from ..quantity import TypedQuantity, own_keys
 
 SCHEMA = "kincheck-case/1"
 SCHEMA_FILE = "kincheck-case.schema.json"
@@ -238,12 +230,9 @@ Length = Annotated[float, Meta(gt=0.0, description="a positive length")]
 Share = Annotated[float, Meta(ge=0.0, le=1.0, description="a part of the whole, 0 to 1")]
 
 
-def _one_of(words: Iterable[str]) -> Meta:
+def one_of(words: Iterable[str]) -> Meta:
+    """Return the description of one of some words."""
     return Meta(description=f"one of {', '.join(words)}")
-
-
-Sides = Annotated[Side, _one_of(Side)]
-Reactions = Annotated[Reaction, _one_of(Reaction)]
 
 
 class UnitsKeys(msgspec.Struct, forbid_unknown_fields=True):
@@ -264,13 +253,12 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     bodies: Table
     drivers: Table
     sweep: Table | None = None
-    truth: Annotated[Truth, _one_of(Truth)] | None = None
+    truth: Annotated[Truth, one_of(Truth)] | None = None
     units: Table = {}
     joints: Table = {}
     couplers: Table = {}
     points: Table = {}
     closure: Table = {}
-    suspension: Table | None = None
     outputs: Table = {}
     reference: Table | None = None
     gravity: Numbers3 = (0.0, 0.0, 0.0)
@@ -356,48 +344,6 @@ class OutputKeys(ToleranceKeys, forbid_unknown_fields=True, kw_only=True):
     component: Annotated[Literal["x", "y", "z"], Meta(description='"x", "y" or "z"')] | None = None
     direction: Numbers3 | None = None
     relative: Flag = False
-
-
-class SuspensionKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """[suspension]; global at design."""
-
-    convention: Annotated[Convention, _one_of(Convention)]
-    side: Sides
-    forward: Numbers3
-    up: Numbers3
-    wheel_center: Text = "wheel_center"
-    center_plane: Numbers3 = (0.0, 0.0, 0.0)
-    static_toe: Number = 0.0
-    static_camber: Number = 0.0
-    wheel_axis: Text | None = None
-    wheel_radius: Length | None = None
-    wheel_contact: Text | None = None
-    kingpin: Points | None = None
-    kingpin_links: Rods | None = None
-    axle: Annotated[Axle, _one_of(Axle)] | None = None
-    wheelbase: Length | None = None
-    cg_height: Length | None = None
-    rack_per_turn: Length | None = None
-    brakes: Reactions = Reaction.OUTBOARD
-    brake_share: Share | None = None
-    drive: Reactions = Reaction.INBOARD
-    drive_share: Share | None = None
-    travel: Text | None = None
-    per_travel: Flag = True
-    other: dict[str, Any] | None = None
-
-
-class OtherWheelKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """[suspension.other]: the axle's other wheel; omitted keys are equal to the first wheel's."""
-
-    wheel_center: Text
-    static_toe: Number | None = None
-    static_camber: Number | None = None
-    wheel_axis: Text | None = None
-    wheel_contact: Text | None = None
-    kingpin: Points | None = None
-    kingpin_links: Rods | None = None
-    travel: Text | None = None
 
 
 class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
@@ -508,18 +454,18 @@ def own_fields(cls: type[Described]) -> list[Field[Any]]:
 
 
 @cache
-def keys_of(cls: type[Described | Measure | SuspensionOutput]) -> type[msgspec.Struct]:
+def keys_of(cls: type[Described | TypedQuantity]) -> type[msgspec.Struct]:
     """Return the keys of a type: `type`, what it joins, its own fields, and for an output its
     tolerance and the reason.
     """
     keys: list[Any] = [("type", Text)]
-    quantity = issubclass(cls, Measure | SuspensionOutput)
+    quantity = issubclass(cls, TypedQuantity)
     if issubclass(cls, Coupler):
         keys.append(("joints", Joints if cls.count else Several))
     elif issubclass(cls, Joint | SpringDamper | Bushing):
         keys.append(("bodies", Bodies))
-    elif issubclass(cls, SuspensionOutput) and not issubclass(cls, AxleOutput):
-        keys.append(("side", Sides | None, None))
+    elif issubclass(cls, TypedQuantity):
+        keys += [(key, *shape) for key, shape in cls.further.items()]
     # classes of users may have annotations that only their own modules can resolve
     hints = {} if issubclass(cls, Joint | Coupler) else get_type_hints(cls)
     for each in own_keys(cls) if quantity else own_fields(cls):
@@ -571,7 +517,7 @@ def _shape(each: Field[Any], hint: Any) -> Any:
         return _FRAME
     for words in (hint, *get_args(hint)):
         if isinstance(words, type) and issubclass(words, StrEnum):
-            return Annotated[hint, _one_of(words)]
+            return Annotated[hint, one_of(words)]
     if hint == tuple[str, str]:
         what = NAMES.get(key_of(each), "point")
         return Annotated[hint, Meta(description=f'two names ["first {what}", "second {what}"]')]

@@ -25,9 +25,8 @@ from ...errors import MOST_NAMED, KincheckError, brief, remedy, shortened
 from ...extras import library
 from ..units import ANGLES, LENGTHS, Unit
 from .document import decimal, fault, read_bytes, shown
-from .foreign import ARCHIVE, EXCEL, MOST_MEMBERS, binary, members, recognise_format
+from .foreign import ARCHIVE, EXCEL, binary, recognise_format, too_large
 
-WORKBOOKS = (".xlsx", ".xlsm")
 DELIMITERS = ";\t,"
 Cell: TypeAlias = str | float
 """A cell: a text, empty for an empty cell, or a number of a workbook."""
@@ -344,12 +343,9 @@ def _require_workbook(file: Path, data: bytes) -> None:
 
 def _too_much(data: bytes) -> str:
     """Return why an archive would take too long to read; empty if not."""
-    if (count := members(data)) > MOST_MEMBERS:
-        return f"has {count} parts, expected {MOST_MEMBERS} at most"
+    if problem := too_large(data, MOST_BYTES):
+        return problem
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        size = sum(each.file_size for each in archive.infolist())
-        if size > MOST_BYTES:
-            return f"unpacks to {size} bytes, expected {MOST_BYTES} at most"
         tags = 0
         for each in archive.infolist():
             elsewhere = 0

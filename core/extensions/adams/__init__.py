@@ -2,4 +2,4 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, needs=["explain"])
+EXTENSION = Extension(__name__, needs=["explain", "trees"], readers={"dataset": "reader:DATASET"})

@@ -11,8 +11,10 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import cast
 
 from ...case.io.document import fault, shown, unknown_name, usable
+from ...case.io.ledger import Asked
 from ...errors import CaseError, remedy
 from ...mechanism.formula import number
 
@@ -39,6 +41,17 @@ ARGUMENTS: Mapping[str, str] = {
     "ACCGRAV": "IGRAV JGRAV KGRAV",
 }
 """Arguments of the statements that are read, in full."""
+APART: Mapping[str, str] = {
+    "PART": "MASS CM IM IP MATERIAL VX VY VZ WX WY WZ VM WM EXACT",
+    "MARKER": "POINT_MASS FLEX_BODY NODE_ID CURVE SURFACE VX VY VZ QP REULER ZP XP RM",
+    "JOINT": "IC ICTRAN ICROT",
+    "MOTION": "ICDISP ICVEL",
+    "SPRINGDAMPER": "ANGLE LENGTH FORCE TORQUE K C KT CT",
+    "GCON": "I",
+}
+"""Arguments of read statements without meaning for kinematics, or for statements of some types:
+initial velocities, markers on no part, the mass of the ground.
+"""
 FORCING = (
     "BUSHING BEAM FIELD GFORCE VFORCE VTORQUE NFORCE MFORCE CONTACT FRICTION CLEARANCE TIRE"
     " FLEX_BODY POINT_MASS PTCV CVCV UCON FEPART FELOAD FENODE"
@@ -73,7 +86,7 @@ class Statement:
     kind: str
     id: int
     line: int
-    values: Mapping[str, str] = field(default_factory=dict[str, str])
+    values: Mapping[str, str] = field(default_factory=lambda: Asked({}))
     flags: Sequence[str] = ()
 
     @property
@@ -218,6 +231,25 @@ class Dataset:
     def of(self, *kinds: str) -> list[Statement]:
         """Return the statements of some kinds."""
         return [each for kind in kinds for each in self.statements.get(kind, {}).values()]
+
+    def unread(self) -> Counter[str]:
+        """Return the unread arguments, by name and kind.
+
+        Raises:
+            CaseError: one of them may mean something for kinematics.
+        """
+        found = Counter[str]()
+        for kind, statements in self.statements.items():
+            for each in statements.values():
+                for name in cast("Asked", each.values).unasked:
+                    if name not in APART.get(kind, "").split():
+                        raise each.fault(
+                            f"{name} = {shown(_plain(each.values[name]))} is not read beside its"
+                            " other arguments, expected it alone; remove it, or the statement by"
+                            f" --without {kind}/{each.id}"
+                        )
+                    found[f"{name} of {kind}"] += 1
+        return found
 
     def once(self, kind: str) -> Statement | None:
         """Return the only statement of a kind, or None."""
@@ -410,7 +442,7 @@ def _arguments(bare: Statement, rest: str) -> Statement:
                 )
             flags.append(flag)
             current = ""
-    return replace(bare, values=values, flags=flags)
+    return replace(bare, values=Asked(values), flags=flags)
 
 
 def _parts(text: str) -> Iterator[str]:

@@ -13,7 +13,6 @@ from numpy.polynomial import Polynomial
 
 from ...case.case import TIME, Sweep
 from ...case.io.document import decimal, fault, shown, unknown_name
-from ...case.io.reader_options import Supplied
 from ...case.io.schema import MOST_SAMPLES
 from ...errors import CaseError, MechanismError, shortened
 from ...mechanism.formula import CURVES, evaluate, polynomial
@@ -30,6 +29,7 @@ from ...mechanism.motions import (
     Table,
 )
 from ..explain.rank import Ranks
+from ..trees.options import DrivingOptions
 from .dataset import Statement
 from .model import Coordinate, Model, coordinates
 
@@ -307,7 +307,7 @@ def read_drives(
     mechanism: Mechanism,
     driven: Sequence[Coordinate],
     moved: Sequence[Drive],
-    supplied: Supplied,
+    supplied: DrivingOptions,
     weak: float,
 ) -> tuple[Mechanism, Sweep, list[str]]:
     """Return the mechanism with its drivers, the sweep, and the drivers without a force: those for

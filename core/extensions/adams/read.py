@@ -8,11 +8,12 @@ from ...case.case import Case, Truth
 from ...case.closing import within_digits
 from ...case.io.document import explained, fault
 from ...case.io.outputs import with_all_motions
-from ...case.io.reader_options import LEFT_OUT, WITHOUT, Supplied
+from ...case.io.readers import LEFT_OUT, WITHOUT
 from ...errors import shortened
 from ...kinematics import degrees_of_freedom
 from ...mechanism.body import Body
 from ...mechanism.mechanism import Mechanism, Point, Vector
+from ..trees.options import DrivingOptions
 from .constraints import (
     ADDED_UP,
     CLOSED,
@@ -32,7 +33,7 @@ from .model import Model, Units, read_bodies, read_markers, read_places, read_un
 _LONGEST_TITLE, _MOST_NAMED = 80, 12
 
 
-def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
+def read_adams(file: Path, text: str, supplied: DrivingOptions) -> Case:
     """Return the case of a dataset; outputs are the coordinates of the parts' centres of mass,
     those of joints, and the rotations of parts.
 
@@ -106,7 +107,8 @@ def _gravity(dataset: Dataset, units: Units) -> Vector:
 
 def _source(dataset: Dataset) -> str:
     """Return the source of the case, with all omissions."""
-    counted = [f"{kind} ({count})" for kind, count in sorted(dataset.left_out.items())]
+    left = {**dataset.left_out, **dataset.unread()}
+    counted = [f"{kind} ({count})" for kind, count in sorted(left.items())]
     left_out = shortened(counted, _MOST_NAMED) or "nothing"
     title = dataset.title[:_LONGEST_TITLE]
     return f"Adams dataset {title!r} of {dataset.file.name}{LEFT_OUT}{left_out}"

@@ -4,4 +4,11 @@ programs, or one sparse system; both are followed by one walk.
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__)
+EXTENSION = Extension(
+    __name__,
+    methods={
+        "by size": "method:by_size",
+        "component by component": "method:by_components",
+        "one sparse system": "method:sparse",
+    },
+)

@@ -61,7 +61,7 @@ class FixedOrder:
         self._alive = starts, pivots, every, sources, pivots + 1, room
         at = [address(each) for each in self._alive[:5]]
         at_numbers = [address(each) for each in numbers]
-        self._factor = partial(_code().calls["factor"], n, *at[:4], *at_numbers[:5])
+        self._factor = partial(load_loops().calls["factor"], n, *at[:4], *at_numbers[:5])
         # first place of each row of L, and of U without its diagonal, the place after its last, and
         # what it is multiplied by
         table = at[2], at_numbers[1]
@@ -82,7 +82,7 @@ class FixedOrder:
             if transposed
             else ("gather", self._lower, self._upper)
         )
-        run, n, there = _code().calls[name], self.n, address(found)
+        run, n, there = load_loops().calls[name], self.n, address(found)
         run(n, 0, 1, *first, there)
         run(n, n - 1, -1, *last, there)
         return found
@@ -114,7 +114,9 @@ def _fill_in(rows: NDArray[np.intp], columns: NDArray[np.intp], n: int) -> list[
 
 
 @cache
-def _code() -> Code:
+def load_loops() -> Code:
+    """Return the loops, compiled if the cache has none."""
+
     def text() -> str:
         return "\n".join([_factor(), _sweep("gather"), _sweep("scatter"), declarations(LANES)])
 

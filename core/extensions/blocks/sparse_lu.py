@@ -21,9 +21,9 @@ import numpy as np
 
 from ...caches import cache_last
 from ...kinematics.structure.degrees_of_freedom import NARROW, Indices
-from ...program.llvm.compiler import available
+from ...program.llvm.machine_code import available
 from ...trajectory import Array
-from .fixed_order import LANES, FixedOrder
+from .fixed_order import LANES, FixedOrder, load_loops
 
 GROWTH = 50.0
 """Largest entry of L that is believed in an order made for another matrix: SuperLU's are one at
@@ -78,7 +78,7 @@ class Pattern:
         )
         self._at, self._entries = at, at[self._matrix.data.astype(np.intp)]
         self._places, self._orders = (rows, columns, n), list[_Order]()
-        if values is not None and available():
+        if values is not None and available(load_loops):
             self._reorder(self._factor_or_none(values))
         self.begin()
 

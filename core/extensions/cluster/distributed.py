@@ -20,6 +20,7 @@ from typing import Any
 from urllib.parse import urlsplit
 from uuid import uuid4
 
+from ...cli.engine_source import WorkersError
 from ...errors import KincheckError
 from ...extras import library
 from ...harness.execution import Attempt, Attempts, Failure, Pair, Solver, error_text
@@ -45,7 +46,7 @@ LIBRARIES = "distributed", "tornado", "asyncio"
 """Loggers with tracebacks of a connection that breaks."""
 
 
-class ClusterError(KincheckError):
+class ClusterError(WorkersError):
     """A cluster cannot be reached, or was lost."""
 
 

@@ -21,7 +21,6 @@ from ...options import (
     option,
     options,
 )
-from ...report.progress import complain
 
 if TYPE_CHECKING:
     from ...case.case import Case
@@ -94,7 +93,6 @@ class Compare(Command):
             refuse(unsolved)
         if self.command:
             tell_left_out(cases)
-            complain(f"note: {case.name}: {note}" for case in cases for note in case.assembly)
         accepted = _tolerances_of(self.tolerance, Path(_name_of(self.cases[0])), designs)
         return designs, views.exceeded(designs, accepted), unsolved
 
@@ -112,7 +110,7 @@ class Compare(Command):
         kinds = dict.fromkeys(columns, Kind.NUMBER)
         deliver(
             views.comparison(designs, beyond),
-            designs.results,
+            views.with_comparison(designs, beyond),
             out=self.out,
             json=self.json,
             files=[

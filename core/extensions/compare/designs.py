@@ -14,6 +14,7 @@ import numpy as np
 from ...case.case import MARKER, PER_TRAVEL, Case
 from ...case.units import LENGTHS
 from ...dataset import Dataset, Variable
+from ...harness.labels import notes as notes_of
 from ...harness.labels import shorten_names
 from ...harness.record import Facts, Results
 from ...joints import Kind
@@ -141,6 +142,34 @@ def side_by_side(designs: Designs) -> dict[str, Sequence[float | None]]:
     return found
 
 
+def with_comparison(designs: Designs, beyond: Sequence[str]) -> Results:
+    """Return the results with what the comparison says among their circumstances: the largest
+    difference of each output, in the units of the first design, and the points that differ.
+    """
+    differences = [
+        {
+            "output": name,
+            "design": label,
+            "unit": designs.units[name],
+            "largest": float(apart[k]),
+            "sample": k,
+            "at": designs.at(k),
+        }
+        for name, label, apart, k in designs.differences()
+    ]
+    points = _of_points(designs.cases)
+    comparison = {
+        "exceeded": [*beyond],
+        "differences": differences,
+        "defined_otherwise": {**designs.other},
+        "points": [dict(zip(points.columns, row, strict=True)) for row in points.rows],
+        "remarks": [*points.verdict],
+    }
+    return msgspec.structs.replace(
+        designs.results, run=designs.results.run | {"comparison": comparison}
+    )
+
+
 def exceeded(designs: Designs, accepted: Mapping[str, float]) -> list[str]:
     """Return a sentence on each difference that is larger than accepted, by output."""
     return [
@@ -204,6 +233,7 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
     ]
     columns = ["output", "design", *heads, "gradient at design", "largest difference", "at"]
     notes = [f"In brackets: the difference from {first}."] if rows else []
+    notes += [f"Note: {case}: {note}." for case, note in notes_of(designs.results.run)]
     return Section("Outputs", verdict, notes, columns, 2, rows)
 
 
@@ -220,7 +250,7 @@ def _of_points(cases: Sequence[Case]) -> Section:
         listed = bool(first.hardpoints and other.hardpoints)
         axes = first.hardpoints[0].axes if listed else [(0, 1.0), (1, 1.0), (2, 1.0)]
         old, new = (_points(each, axes, listed=listed) for each in (first, other))
-        moved = 0
+        moved = False
         for key, (name, before) in old.items():
             called, after = new.get(key, (name, before))
             if np.abs(after - before).max() < SAME:
@@ -229,7 +259,7 @@ def _of_points(cases: Sequence[Case]) -> Section:
             numbers = (_point_text(each / size) for each in (before, after, after - before))
             title = name if called == name else f"{name} ({called})"
             rows.append([title, other.name, *numbers])
-            moved += 1
+            moved = True
         if not moved:
             pair = f"{first.name} and {other.name}"
             verdict.append(f"No point that both have differs between {pair}.")

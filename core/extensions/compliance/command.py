@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...case.io.reader_options import HARDPOINTS, Supplied
+from ...case.io.reader_options import Supplied
 from ...cli import shared_options
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import TOL, Isolated
-from ...errors import KincheckError, refuse
+from ...errors import KincheckError, labelled, refuse
 from ...options import (
     argument,
     destination,
@@ -24,6 +24,7 @@ from ...options import (
     several,
     with_values,
 )
+from ..hardpoints.options import HARDPOINTS
 
 if TYPE_CHECKING:
     from ...case.case import Case
@@ -95,13 +96,13 @@ class MeasureCompliance(Isolated):
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ...case.io.atomic_files import write
-        from ...case.models.files import is_table
         from ...case.units import LENGTHS
         from ...harness.engine import STANDARD
         from ...harness.record import to_json
         from ...report.progress import complain, missing_requirements
         from ...report.table import print_table
         from ...report.terminal import with_json
+        from ..hardpoints.reader import is_table
         from . import study, views
 
         problems = shared_options.contradictions(self)
@@ -109,7 +110,7 @@ class MeasureCompliance(Isolated):
         refuse(problems or shared_options.unreachable(self))
         typed, axle = self.supplied.travel, self.supplied.axle
         travel = None if typed is None else _values("--travel", _both_ways(typed), LENGTHS)
-        table = os.path.isfile(self.case) and is_table(Path(self.case))
+        table = os.path.isfile(self.case) and is_table(Path(self.case), self.supplied)
         # the sweep of a table's case; one sample is none
         swept = table and travel is not None and travel[0] != travel[-1]
         supplied = replace(
@@ -141,7 +142,9 @@ class MeasureCompliance(Isolated):
             print(*views.lines(results), sep="\n", file=console.file)
             if checked is not None:
                 print_table(checked, console.file, reactions=True)
-            complain(f"note: {note}" for note in (*case.assembly, *results.travel.notes))
+            every = results.travel, *results.loads.values()
+            notes = (*case.assembly, *(note for each in every for note in each.notes))
+            complain(labelled(note) for note in dict.fromkeys(notes))
         named = [each.name for each in engines if each.name != STANDARD]
         problems += views.failures(results)
         problems += missing_requirements(checked, (), named) if checked else []
@@ -186,7 +189,9 @@ class MeasureCompliance(Isolated):
                     resume=False,
                 )
             except HistoryError as error:
-                problems.append(f"{error}; the run is not in the history")
+                from ...cli.destinations import not_in_history
+
+                problems.append(not_in_history(self, error))
 
         def add(record: Record, done: int, total: int) -> None:
             if keeping is not None:

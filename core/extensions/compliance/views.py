@@ -158,16 +158,21 @@ def failures(results: ComplianceResults) -> list[str]:
 
 def lines(results: ComplianceResults) -> Iterator[str]:
     """Yield the slopes and rates at the sample nearest to design, and the ends of each curve."""
-    curves = results.travel
-    unit, factor = unit_of_axis(curves)
     yield f"{results.case}: {results.signs}"
+    for curves in (results.travel, *results.loads.values()):
+        yield from _lines(curves)
+
+
+def _lines(curves: ComplianceCurves) -> Iterator[str]:
+    """Yield the lines of curves over travel or over a load."""
+    unit, factor = unit_of_axis(curves)
     k = _near_design(curves)
     if not math.isfinite(curves.wheel_load[k]):
-        yield f"no equilibrium at any of {len(curves.at)} samples of travel"
+        yield f"no equilibrium at any of {len(curves.at)} samples of {curves.axis}"
         return
     load = float(curves.wheel_load[k])
     load = 0.0 if abs(load) < ZERO else load
-    yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {load:.6g} N"
+    yield f"at {curves.axis} {factor * curves.at[k]:.6g} {unit}, wheel load {load:.6g} N"
     for name, each in curves.outputs.items():
         shown, size = _shown(each.unit)
         if not np.isfinite(each.values).any():

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from ...case.case import Case
 from ...case.io.document import measure
-from ...case.io.reader_options import CurveOptions, Supplied
+from ...case.io.reader_options import CurveOptions
 from ...case.io.reference_curve import with_curve
 from ...case.io.table import read_unit
-from ...case.models.files import is_table, load
+from ...case.models.files import load
 from ...case.units import LENGTHS, Unit
 from ...cli.shared_options import driver_value
 from ...errors import CaseError, KincheckError, unknown
 from ...trajectory import Array
+from ..hardpoints.options import WheelOptions
 
 GOAL = '--goal "OUTPUT [at TRAVEL] = VALUE +- TOLERANCE UNIT"'
 MOVE = '--move "POINT: AXES +- BOX UNIT"'
@@ -68,7 +69,7 @@ class _Draft:
 
 
 def read_goals(
-    texts: Sequence[str], case: Case, supplied: Supplied
+    texts: Sequence[str], case: Case, supplied: WheelOptions
 ) -> tuple[Case, list[Goal], list[str]]:
     """Return the case with the travels of the goals among its samples, the goals, and notes on
     files.
@@ -195,7 +196,7 @@ def _of_table(si: str, case: Case) -> str:
     return "/".join([{"m": case.length_unit, "rad": case.angle_unit}.get(first, first), *per])
 
 
-def _curve(goal: _Draft, case: Case, supplied: Supplied) -> tuple[Array, list[str]]:
+def _curve(goal: _Draft, case: Case, supplied: WheelOptions) -> tuple[Array, list[str]]:
     """Return the values of a goal's file at the samples: a measured curve, or those of another
     table or case.
     """
@@ -219,12 +220,14 @@ def _curve(goal: _Draft, case: Case, supplied: Supplied) -> tuple[Array, list[st
     return series.position, notes
 
 
-def _of_design(goal: _Draft, file: Path, case: Case, supplied: Supplied, error: CaseError) -> Array:
+def _of_design(
+    goal: _Draft, file: Path, case: Case, supplied: WheelOptions, error: CaseError
+) -> Array:
     from ...harness.compare import output_series
     from ...kinematics import NativeSolver
 
     try:
-        other = load(file, supplied if is_table(file, supplied) else Supplied())
+        other = load(file, supplied)
     except CaseError:
         raise error from None
     output = next((each for each in other.outputs if each.name == goal.output), None)

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from ...case.case import Case
-from ...case.io.reader_options import Supplied
-from ...case.models.files import read_hardpoints
 from ...case.units import Unit
 from ...cli.registry import Registry
 from ...cli.shared_options import TOL
@@ -20,7 +18,9 @@ from ...report.axis import number
 from ...report.sections import Report
 from ...trajectory import Array
 from ..compare.designs import comparison, designs_of
+from ..hardpoints.options import WheelOptions
 from ..hardpoints.read import case_of_hardpoints
+from ..hardpoints.reader import read_hardpoints
 from ..hardpoints.table import Hardpoint, HardpointTable, unit_of
 from ..sweep.curves import curves
 from .goals import Goal, read_goals, read_moves
@@ -168,7 +168,7 @@ class Search:
 def tune(
     case: Case,
     file: Path,
-    supplied: Supplied,
+    supplied: WheelOptions,
     wanted: tuple[Sequence[str], Sequence[str]],
     starts: int,
     registry: Registry,
@@ -261,7 +261,7 @@ def _moved(
 
 def _case_of(
     table: HardpointTable,
-    supplied: Supplied,
+    supplied: WheelOptions,
     points: Sequence[tuple[float, float, float]],
     case: Case,
     file: Path,

@@ -23,7 +23,7 @@ from ...harness.provenance import circumstances
 from ...harness.record import Outcome
 from ...harness.run import run
 from ...program import disk_cache
-from ...program.llvm import compiler
+from ...program.llvm import compiler, machine_code
 
 SCHEMA = "kincheck-doctor/1"
 # Extras of the package and their purposes, except engines. Requirements without an extra are
@@ -128,7 +128,7 @@ class Examination(msgspec.Struct, frozen=True):
 
 def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) -> Examination:
     """Examine the installation, with the named engines, and solve a case with the native engine."""
-    problem = _cache_problem()
+    problem, compiled = _cache_problem(), machine_code.available()
     (record,) = run([case], [native], tol=tol).records
     found = [each.position for each in record.errors.values() if each.position is not None]
     worst = max(found, key=lambda each: each.ratio, default=None)
@@ -149,10 +149,10 @@ def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) ->
         os.cpu_count() or 1,
         (
             "machine code"
-            if compiler.available()
-            else "numpy: with llvmlite it is some fifty times faster"
+            if compiled
+            else "numpy: with llvmlite that works it is some fifty times faster"
         ),
-        compiler.vector_width() if compiler.available() else None,
+        compiler.vector_width() if compiled else None,
         str(disk_cache.folder() or "nowhere"),
         0 if problem else disk_cache.size(),
         problem,
@@ -183,7 +183,7 @@ def parts(engines: Collection[str]) -> list[Part]:
                 if group
                 else f"pip install '{requirement.split(';')[0].strip()}'"
             )
-            problem = "not installed" if version is None else ""
+            problem = "not installed" if version is None else _age(version, requirement)
             found.append(
                 Part(
                     name,
@@ -209,6 +209,18 @@ def parts(engines: Collection[str]) -> list[Part]:
         *_with_import_problems(found, modules, pythons),
         Part("chromium", browser, "tests of the report", False, *missing),
     ]
+
+
+def _age(version: str, requirement: str) -> str:
+    """Return that a version is older than a requirement allows; empty if it is not."""
+    bound = re.search(r">=([\d.]+)", requirement)
+    old = bound and _release(version) < _release(bound[1])
+    return f"older than {bound[1]}" if bound and old else ""
+
+
+def _release(version: str) -> list[int]:
+    """Return the numbers of a version before any letter."""
+    return [int(part) for part in re.findall(r"\d+", re.split(r"[^\d.]", version)[0])]
 
 
 def _version(name: str, python: str = sys.executable) -> str | None:
@@ -248,7 +260,10 @@ def _with_import_problems(
     }
     result: list[Part] = []
     for part in found:
-        problem = _import_problem(running[part.name]) if part.name in running else part.problem
+        unusable = _import_problem(running[part.name]) if part.name in running else ""
+        problem = unusable or part.problem
+        if part.name == "llvmlite" and part.version and not problem:
+            problem = machine_code.problem()
         remedy = part.remedy or (_repair(part.name, problem) if problem else "")
         result.append(msgspec.structs.replace(part, problem=problem, remedy=remedy))
     return result

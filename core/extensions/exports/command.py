@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 def formats() -> str:
     """Return the formats and languages as text for the help."""
     found = [f"{name} ({each.where})" for name, each in offers("formats").items()]
-    *first, last = [*found, *(name for name in offers("codes"))]
-    return f"{', '.join(first)} or {last}"
+    found += offers("codes")
+    return " or ".join(filter(None, [", ".join(found[:-1]), *found[-1:]])) or "none is installed"
 
 
 def writer_of(name: str) -> Writer:

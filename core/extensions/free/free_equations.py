@@ -36,9 +36,9 @@ from ...mechanism.mechanism import Mechanism, coordinates
 from ...mechanism.motions import Driver
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive
 from ...program import Plan, Tape
-from ...program.llvm.compiler import available
 from ...program.llvm.executor import bind
 from ...program.llvm.jit import LlvmCode
+from ...program.llvm.machine_code import available
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory
 
 # Singular values below this part of the largest are zero, as for `structure.redundancy`.

@@ -8,4 +8,13 @@ EXTENSION = Extension(
     __name__,
     commands={"templates": "command:PrintTemplates"},
     completions={"template": "templates:TEMPLATES"},
+    sections={"suspension": "suspension_section:SECTION"},
+    readers={
+        "chrono": "reader:CHRONO",
+        "adams_car": "reader:ADAMS",
+        "assetto": "reader:ASSETTO",
+        "table": "reader:TABLE",
+        "tree": "reader:TREE",
+        "workbook": "reader:WORKBOOK",
+    },
 )

@@ -18,8 +18,7 @@ import numpy as np
 from ...algebra import vec
 from ...case.case import Case, Hardpoint, Quantity, Sweep, size
 from ...case.io.document import decimal, fault, interval, measure, require_known, shown
-from ...case.io.outputs import default, with_all_coordinates, with_slopes
-from ...case.io.reader_options import Supplied
+from ...case.io.outputs import default, with_all_coordinates
 from ...case.io.schema import MOST_SAMPLES
 from ...case.quantity import AXES, with_markers
 from ...case.units import LENGTHS
@@ -29,9 +28,11 @@ from ...kinematics import places
 from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ...mechanism.motions import Driver, JointDisplacement, Motion, PointCoordinate, Ramp, Table
 from ...trajectory import Array
+from .options import WheelOptions
 from .suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
 from .suspension.corner import MARKER_DISTANCE
 from .suspension.wheel import Place
+from .suspension_section import with_slopes
 from .table import Axes, HardpointTable
 from .templates import TIEROD_INNER, WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
 
@@ -216,7 +217,7 @@ def vehicle_of(
     template: Template,
     named: Mapping[str, str],
     at: Mapping[str, Vector],
-    supplied: Supplied,
+    supplied: WheelOptions,
     side: Side,
 ) -> Vehicle:
     """Return the vehicle around the wheel; the wheel's radius and axis follow from points if

@@ -14,9 +14,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from ...case.io.document import fault, parse, shown
-from ...case.io.reader_options import Supplied
+from ...case.io.document import Section, fault, parse, shown
 from ...errors import MOST_NAMED, remedy, shortened
+from .options import WheelOptions
 from .table import Hardpoint, HardpointTable, number, require_name, twice, wanted_corner
 
 _TOKEN = re.compile(
@@ -222,6 +222,7 @@ def read_adams(file: Path, text: str) -> HardpointTable:
         for name, rows in sections.items()
         if name not in ("HARDPOINT", "UNITS", "") and rows
     ]
+    left_out += [f"{sections.get('', 0)} rows above the first block"] * ("" in sections)
     left_out += [f"({name}): {shortened(rows, MOST_NAMED)}" for name, rows in variants.items()]
     left_out += [f"{right} points of the right side"] * bool(right)
     return HardpointTable(file, "Adams/Car", points, unit, "rearward,right,up", None, left_out)
@@ -283,10 +284,15 @@ def is_chrono(tables: Mapping[str, Any]) -> bool:
 
 
 _BESIDE_BUSHINGS = (
-    *("Bushing Data", "Mass", "COM", "Moments of Inertia", "Products of Inertia"),
+    *("Bushing Data", "Mass", "COM", "Moments of Inertia"),
     *("Spring Coefficient", "Curve Data", "Free Length", "Damping Coefficient"),
 )
 """Keys that a file with bushings has for statics."""
+
+
+_BUSHING_KEYS = tuple(
+    f"{law} {kind}" for law in ("Stiffness", "Damping") for kind in ("Linear", "Rotational")
+)
 
 
 def read_chrono(file: Path, text: str) -> HardpointTable:
@@ -330,6 +336,8 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
                 points[name] = Hardpoint(_point(file, name, value), name)
             elif not (soft and key in _BESIDE_BUSHINGS):
                 others.append(key)
+            elif key == "Bushing Data":
+                _require_bushing_keys(Section(file, name, value))
         if others:
             left_out.append(f"{section} ({', '.join(others)})")
     if not points:
@@ -343,6 +351,13 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
         *(file, "Project Chrono", points, "m", "forward,left,up", template, left_out, toe, camber),
         beside=beside,
     )
+
+
+def _require_bushing_keys(data: Section) -> None:
+    """Refuse keys of a bushing unknown to Chrono (ChVehicleJoint.cpp)."""
+    data.require_keys((*_BUSHING_KEYS, "DOF"))
+    if data.at("DOF").value is not None:
+        data.at("DOF").require_keys(_BUSHING_KEYS)
 
 
 def _point(file: Path, key: str, value: object) -> tuple[float, float, float]:
@@ -366,7 +381,7 @@ def is_assetto(text: str) -> bool:
     return re.search(rf"^\s*{_OF_ASSETTO.pattern}\s*=", text, re.MULTILINE) is not None
 
 
-def read_assetto(file: Path, text: str, supplied: Supplied) -> HardpointTable:
+def read_assetto(file: Path, text: str, supplied: WheelOptions) -> HardpointTable:
     """Return the points of an axle of Assetto Corsa (suspensions.ini), of its left wheel unless the
     corner is a right one.
 
@@ -377,7 +392,7 @@ def read_assetto(file: Path, text: str, supplied: Supplied) -> HardpointTable:
         CaseError: there are several axles with points, none, no TRACK, or an invalid point.
     """
     sections = dict[str, dict[str, tuple[str, str]]]()
-    section = ""
+    section, stray = "", list[str]()
     for k, line in enumerate(text.splitlines(), 1):
         row = re.split(r";|//", line)[0].strip()
         key, equals, value = (part.strip() for part in row.partition("="))
@@ -388,6 +403,8 @@ def read_assetto(file: Path, text: str, supplied: Supplied) -> HardpointTable:
             if key in keys:
                 raise twice(file, f"line {k}", key, keys[key][0])
             keys[key] = (f"line {k}", value)
+        elif row:
+            stray.append(f"line {k}")
     axles = [name for name, keys in sections.items() if any(map(_OF_ASSETTO.fullmatch, keys))]
     corner = None if supplied.corner is None else wanted_corner(file, supplied.corner)
     wanted = supplied.sheet or (corner[0] if corner else "")
@@ -402,6 +419,7 @@ def read_assetto(file: Path, text: str, supplied: Supplied) -> HardpointTable:
     outward = -1.0 if corner and corner[1] == "right" else 1.0
     points = {"wheel_center": Hardpoint((0.0, outward * half, 0.0), keys["TRACK"][0])}
     left_out = [f"[{name}]" for name in sections if name and name != chosen[0]]
+    left_out += [*sections.get("", ()), *stray]
     for key, (where, value) in keys.items():
         if not _OF_ASSETTO.fullmatch(key):
             left_out += [f"{key}={value}"] * (key not in ("TRACK", "TYPE"))

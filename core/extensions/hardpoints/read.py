@@ -26,7 +26,7 @@ from ...case.io.document import (
     unknown_name,
 )
 from ...case.io.escape import visible
-from ...case.io.reader_options import LEFT_OUT, Supplied
+from ...case.io.readers import LEFT_OUT
 from ...case.notes import SUSPENSIONS
 from ...case.quantity import with_markers
 from ...case.units import plain
@@ -43,6 +43,7 @@ from .design import (
     with_axis,
     with_suspension_outputs,
 )
+from .options import WheelOptions
 from .rubber import of_chrono, with_file, with_rubber
 from .shims import shims
 from .suspension import Side
@@ -75,7 +76,7 @@ _SPELLINGS: Mapping[str, str] = {
 }
 
 
-def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
+def case_of_hardpoints(table: HardpointTable, supplied: WheelOptions) -> Case:
     """Return the case of a suspension; it is consensus_only.
 
     Its outputs are all suspension outputs defined by its points, and the coordinates of three
@@ -159,7 +160,9 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     return case
 
 
-def _missing_outputs(template: Template, at: Mapping[str, Vector], supplied: Supplied) -> list[str]:
+def _missing_outputs(
+    template: Template, at: Mapping[str, Vector], supplied: WheelOptions
+) -> list[str]:
     """Return the outputs of optional data that are not there, each with what to add."""
     axle = supplied.axle is not None
     across = template.across.items() if axle else ()
@@ -176,7 +179,7 @@ def _missing_outputs(template: Template, at: Mapping[str, Vector], supplied: Sup
 
 
 def _side(
-    table: HardpointTable, center: str, axes: Axes, supplied: Supplied
+    table: HardpointTable, center: str, axes: Axes, supplied: WheelOptions
 ) -> tuple[Side, list[str]]:
     """Return the side of the wheel, and a note if it follows from the points alone.
 
@@ -238,7 +241,7 @@ def _of_corner(table: HardpointTable, said: str | None) -> HardpointTable:
     return replace(table, points=kept, left_out=left_out, side=side, corner=wanted)
 
 
-def _template(table: HardpointTable, supplied: Supplied) -> tuple[Template, list[str]]:
+def _template(table: HardpointTable, supplied: WheelOptions) -> tuple[Template, list[str]]:
     """Return the template that the user or the file states, or else the one whose roles the points
     fill by their names, with a note.
     """
@@ -276,7 +279,7 @@ def _template(table: HardpointTable, supplied: Supplied) -> tuple[Template, list
 
 
 def _fill_roles(
-    table: HardpointTable, template: Template, supplied: Supplied
+    table: HardpointTable, template: Template, supplied: WheelOptions
 ) -> tuple[dict[str, str], list[str]]:
     """Return the name of the point for each role of the template, and notes on the names. A file of
     names that does not exist yet is written.
@@ -286,9 +289,9 @@ def _fill_roles(
     named = _points_by_role(table)
     filled = dict[str, str]()
     if own is not None and not new:
-        filled |= _read_own_names(
-            own, [role.name for role in (*template.roles, *template.optional)], table.points
-        )
+        roles = [role.name for role in (*template.roles, *template.optional)]
+        filled |= _read_own_names(own, roles, table.points)
+    unnamed = own if not filled and not new else None
     for role in (*template.roles, *template.optional):
         if role.name in filled:
             continue
@@ -327,6 +330,10 @@ def _fill_roles(
         where = table.points[name].where if name else ""
         place = "" if where in (name, "") else f", {where}"
         lines.append(f"{role.name}, {role.meaning}" + f" (is it {name!r}{place}?)" * bool(name))
+    if unnamed is not None:
+        expected = f'expected lines such as {missing[0].name} = "NAME"'
+        problem = f"found no names, all lines are comments, {expected}"
+        raise fault(unnamed, "", f"{problem}; take the # away from lines that you fill in")
     problem = f"template {template.name}: missing {'; '.join(lines)}"
     advice = "say with --names FILE which point is which; a new FILE is written to be filled in"
     if new:

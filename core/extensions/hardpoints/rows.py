@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 from ...case.io.document import fault, shown
-from ...case.io.reader_options import NOTHING, Supplied
 from ...case.io.table import (
     DELIMITERS,
     Cell,
@@ -33,6 +32,7 @@ from ...case.io.table import (
 )
 from ...case.units import LENGTHS
 from ...errors import MOST_NAMED, brief, shortened
+from .options import NOTHING, WheelOptions
 from .programs import plain_lines
 from .table import (
     Hardpoint,
@@ -45,7 +45,7 @@ from .table import (
     twice,
     wanted_corner,
 )
-from .templates import ROLES, agree, compact, corner_of
+from .templates import ROLES, agree, compact, corner_of, head_of_corner
 from .tree import FEWEST, axis_of, fact_of, is_assignments, read_assignments
 
 COMMENTS = ("#", "%", "//")
@@ -60,7 +60,6 @@ _COLUMN = re.compile(
     r"(?:[-_ ]?(?:value|coord|coordinate|pos|position|koordinate))?"
     r"(?:\s*[\[(_/,]\s*([a-z]+)\s*[\])]?|\s+(?:in\s+)?([a-z]+))?"
 )
-_CORNERS = ("corner", "wheel", "wheelposition", "axle", "side", "location")
 _REMARKS = ("meaning", "remark", "remarks", "comment", "comments", "note", "notes", "description")
 _SIGNS = re.compile(rf"[{DELIMITERS}]+")
 
@@ -84,7 +83,7 @@ class Head:
     @property
     def of_corners(self) -> list[int]:
         """Indices of the columns whose names are those of corners, axles or sides."""
-        return [k for k, name in enumerate(self.names) if compact(name) in _CORNERS]
+        return [k for k, name in enumerate(self.names) if head_of_corner(name)]
 
     @property
     def others(self) -> list[str]:
@@ -96,7 +95,7 @@ _Parts: TypeAlias = tuple[Head, Sequence[Row], Sequence[Row]]
 """The head of a table, and the rows above and below it."""
 
 
-def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
     """Return the points of a text by name.
 
     Args:
@@ -140,7 +139,7 @@ def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoint
     return read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
 
 
-def read_spreadsheet(file: Path, supplied: Supplied) -> HardpointTable:
+def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:
     """Return the points of a workbook by name.
 
     Args:
@@ -207,7 +206,9 @@ def _join_words(words: Sequence[Cell]) -> Sequence[Cell]:
     return words
 
 
-def read_rows(table: Table, tool: str, facts: dict[str, str], supplied: Supplied) -> HardpointTable:
+def read_rows(
+    table: Table, tool: str, facts: dict[str, str], supplied: WheelOptions
+) -> HardpointTable:
     """Return the points of a table by name.
 
     Args:
@@ -418,7 +419,7 @@ def _as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
     if not {"x", "y", "z"} <= columns.keys():
         return None
     if "name" not in columns:  # the only column before the coordinates, under any name, or beside
-        before = [k for k in range(min(columns.values())) if compact(texts[k]) not in _CORNERS]
+        before = [k for k in range(min(columns.values())) if not head_of_corner(texts[k])]
         if len(before) != 1:
             before = [k for k in range(4) if k not in columns.values()]
             if before[0] != 3 or any(texts[3:]):  # below no name, at the end

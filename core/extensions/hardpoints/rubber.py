@@ -224,17 +224,17 @@ def with_file(
     Raises:
         CaseError: the file cannot be read, or a role has no joint for a bushing.
     """
-    root, found = bushings_in(file), dict[str, Any]()
+    root, found = bushings_in(file, "bushings", "joints"), dict[str, Any]()
     known = [role for role in at if joint_at(template, role)]
     for role, section in root.at("bushings").each() if root.at("bushings").value else ():
         section.require(role, known, f"a role of a joint of {template.name}")
         keys = section.typed(RoleKeys)
         found[role] = {name: getattr(keys, name) for name in keys.__struct_fields__}
     if not found:
-        return with_bushings(case, file)
+        return with_bushings(case, file, "bushings")
     with root.at("bushings").explained():
         case = with_rubber(case, template, at, sides, Rubber(found))
-    return with_bushings(case, file) if root.at("joints").value is not None else case
+    return with_bushings(case, file, "bushings") if root.at("joints").value is not None else case
 
 
 def sample_bushings(template: Template) -> str:

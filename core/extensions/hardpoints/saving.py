@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
-from ...case.io.reader_options import Supplied
-from ...case.models.files import read_hardpoints
+from ...case.io.document import number_or_nan, read_text
+from ...case.io.table import DELIMITERS, numeral
 from ...errors import CaseError, KincheckError
-from .table import HardpointTable, unit_of
+from .options import WheelOptions
+from .reader import read_hardpoints
+from .table import Hardpoint, HardpointTable, axes_of, unit_of
 
 NAME = re.compile(r"[^\W_][\w .+-]{0,80}\.csv")
 """A plain name: no folder, no hidden file."""
@@ -25,12 +29,12 @@ def free_name(file: Path) -> str:
 
 
 def save_table(
-    table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]], name: str
+    table: HardpointTable, supplied: WheelOptions, points: Sequence[Sequence[float]], name: str
 ) -> Path:
     """Write a table with other numbers to a new file beside its own.
 
-    The text keeps all else; a table of another format is written as CSV with its unit, axes and
-    template. The new file is read back.
+    The text keeps all else; a table of another format is written as CSV with its unit, axes, side
+    and template. The new file is read back.
 
     Raises:
         KincheckError: the name is not plain, the file exists, or cannot be written.
@@ -45,23 +49,36 @@ def save_table(
 
 def write_table(
     table: HardpointTable,
-    supplied: Supplied,
+    supplied: WheelOptions,
     points: Sequence[Sequence[float]],
     path: Path,
     option: str,
 ) -> Path:
-    """Write a table with other numbers to a new CSV file, as `save_table` does.
+    """Write a table with other numbers to a new file, as `save_table` does.
 
     Args:
         option: what the user gave, for messages.
 
     Raises:
-        KincheckError: the file exists, or cannot be written.
+        KincheckError: the file exists, cannot be written, or would be read with other numbers.
     """
-    content = _text_with_changes(table, points) or _new_text(table, supplied, points)
+    alone = replace(supplied, sheet=None, corner=None)  # the new file has one table
+    tries = [*_texts_with_changes(table, points), _new_text(table, supplied, points)]
+    for content, said in zip(tries, [*[supplied] * (len(tries) - 1), alone], strict=True):
+        _write(path, content, option)
+        if _reads_back(path, said, supplied, table, points):
+            return path
+        path.unlink()
+    raise KincheckError(
+        f"{option}: the file would be read with other numbers; nothing was written: save the"
+        " table from the program that made it"
+    )
+
+
+def _write(path: Path, content: bytes, option: str) -> None:
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
     try:
-        with open(os.open(path, flags, 0o644), "w", encoding="utf-8", newline="") as file:
+        with open(os.open(path, flags | getattr(os, "O_BINARY", 0), 0o644), "wb") as file:
             file.write(content)
     except FileExistsError:
         raise KincheckError(f"{option}: the file exists and stays; give another name") from None
@@ -70,61 +87,109 @@ def write_table(
             f"{option}: cannot be written ({error.strerror}); give another name, or start"
             " kincheck with a file in a folder that is writable"
         ) from None
-    if not _reads_back(path, supplied, table, points):
-        path.unlink()
-        raise KincheckError(
-            f"{option}: the file would be read with other numbers; nothing was written: save"
-            " the table from the program that made it"
-        )
-    return path
 
 
 def _reads_back(
-    path: Path, supplied: Supplied, table: HardpointTable, points: Sequence[Sequence[float]]
+    path: Path,
+    said: WheelOptions,
+    supplied: WheelOptions,
+    table: HardpointTable,
+    points: Sequence[Sequence[float]],
 ) -> bool:
-    """Return whether a file is read as these points."""
+    """Return whether a file is read as these points of the same wheel.
+
+    Args:
+        said: facts for the new file.
+        supplied: facts of the table.
+    """
     try:
-        found = read_hardpoints(path, supplied)
+        found = read_hardpoints(path, said)
+        facts = [
+            (
+                *(unit_of(each, given.units).size, axes_of(each, given.axes), each.side),
+                *(each.template or given.template, each.static_toe, each.static_camber),
+            )
+            for each, given in ((found, said), (table, supplied))
+        ]
     except CaseError:
         return False
-    angles = (found.static_toe, found.static_camber) == (table.static_toe, table.static_camber)
     positions = {name: each.position for name, each in found.points.items()}
     wanted = {name: tuple(row) for name, row in zip(table.points, points, strict=True)}
-    return angles and positions == wanted
+    return facts[0] == facts[1] and positions == wanted
 
 
-def _text_with_changes(table: HardpointTable, points: Sequence[Sequence[float]]) -> str | None:
-    """Return the text of a table with the changed numbers replaced; None unless each point is a
-    line of text with plain numbers.
+def _texts_with_changes(
+    table: HardpointTable, points: Sequence[Sequence[float]]
+) -> Iterator[bytes]:
+    """Yield the text of a table with the changed numbers replaced, by each sign between fields and
+    decimal sign with which the lines have the numbers of the points; none unless each point is a
+    line of text.
     """
     if table.file.suffix.lower() != ".csv":
-        return None
-    lines = table.file.read_text("utf-8").splitlines(keepends=True)
-    for (name, old), row in zip(table.points.items(), points, strict=True):
-        if tuple(row) == old.position:
-            continue
-        where = re.fullmatch(r"line (\d+)", old.where)
-        if where is None:
-            return None
-        k = int(where[1]) - 1
-        fields = re.split(r"([,;\t])", lines[k].rstrip("\r\n"))
-        first = next((j for j, each in enumerate(fields) if each.strip(' "') == name), None)
-        if first is None or len(fields) < first + 7:
-            return None
-        for axis, (number, before) in enumerate(zip(row, old.position, strict=True)):
-            if number != before:
-                fields[first + 2 * axis + 2] = _number_text(number)
-        end = lines[k][len(lines[k].rstrip("\r\n")) :]
-        lines[k] = "".join(fields) + end
-    return "".join(lines)
+        return
+    data = table.file.read_bytes()
+    text = read_text(table.file, len(data), "", of_spreadsheet=True)
+    encoding = next(
+        name for name in ("utf-8", "utf-16", "cp1252") if _decoded(data, name).endswith(text)
+    )
+    mark = data[:3] if data.startswith(codecs.BOM_UTF8) else b""
+    for delimiter in DELIMITERS:
+        for sign in ".,":
+            lines = text.splitlines(keepends=True)
+            rows = zip(table.points.items(), points, strict=True)
+            if delimiter != sign and all(
+                _change(lines, name, old, row, delimiter, sign) for (name, old), row in rows
+            ):
+                yield mark + "".join(lines).encode(encoding)
 
 
-def _new_text(table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]]) -> str:
-    """Return a new table as CSV, with unit, axes and template."""
+def _decoded(data: bytes, encoding: str) -> str:
+    """Return the text of data; empty in another encoding."""
+    try:
+        return data.decode(encoding)
+    except UnicodeError:
+        return ""
+
+
+def _change(
+    lines: list[str],
+    name: str,
+    old: Hardpoint,
+    row: Sequence[float],
+    delimiter: str,
+    sign: str,
+) -> bool:
+    """Change the numbers of a point in its line; return whether the line has the old ones."""
+    where = re.fullmatch(r"line (\d+)", old.where)
+    if where is None:
+        return False
+    if tuple(row) == old.position:
+        return True
+    k = int(where[1]) - 1
+    end = lines[k][len(lines[k].rstrip("\r\n")) :]
+    fields = lines[k].removesuffix(end).split(delimiter)
+    first = next((j for j, each in enumerate(fields) if each.strip(' "') == name), len(fields))
+    places = range(first + 1, first + 4)
+    if len(fields) < places.stop:
+        return False
+    for j, number, before in zip(places, row, old.position, strict=True):
+        if number_or_nan(numeral(fields[j].strip(' "'), sign)) != before:
+            return False
+        if number != before:
+            fields[j] = _number_text(number).replace(".", sign)
+    lines[k] = delimiter.join(fields) + end
+    return True
+
+
+def _new_text(
+    table: HardpointTable, supplied: WheelOptions, points: Sequence[Sequence[float]]
+) -> bytes:
+    """Return a new table as CSV, with unit, axes, side and template."""
     known = {
         "template": table.template or supplied.template,
         "units": unit_of(table, supplied.units).name,
         "axes": table.axes or supplied.axes,
+        "side": table.side,
     }
     text = StringIO()
     text.write("".join(f"# {key}: {value}\n" for key, value in known.items() if value))
@@ -132,7 +197,7 @@ def _new_text(table: HardpointTable, supplied: Supplied, points: Sequence[Sequen
     writer.writerow(["name", "x", "y", "z"])
     for name, row in zip(table.points, points, strict=True):
         writer.writerow([name, *map(_number_text, row)])
-    return text.getvalue()
+    return text.getvalue().encode()
 
 
 def _number_text(number: float) -> str:

@@ -2,22 +2,43 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from ...algebra import vec
-from ...case.case import Case
-from ...case.io.document import Section, shown, toml_table
-from ...case.io.schema import OtherWheelKeys, SuspensionKeys
+from ...case.case import Case, size
+from ...case.io.document import Section, shown
+from ...case.io.outputs import check_point, direction, tolerance
+from ...case.io.schema import keys_of
+from ...case.io.sections import CaseSection
+from ...case.io.toml_text import toml_table
+from ...case.quantity import Quantity, TypedQuantity, own_keys
 from ...errors import CaseError
 from ...joints.base import unit
 from ...mechanism.mechanism import Mechanism, Vector
 from ...mechanism.motions import PointCoordinate
-from .suspension import AxleOutput, PerTravel, Side, SuspensionOutput, Vehicle
+from .suspension import (
+    AxleOutput,
+    Camber,
+    MotionRatio,
+    PerTravel,
+    Rate,
+    Side,
+    SuspensionOutput,
+    Toe,
+    Vehicle,
+    camber_of_front_view,
+)
+from .suspension.base import WheelOutput
+from .suspension_keys import OtherWheelKeys, SuspensionKeys
+
+if TYPE_CHECKING:
+    from ...harness.scene_record import SceneWheel
+    from ...trajectory import Array
 
 # Axes with nine digits are perpendicular to about 1e-9; a wrong sign or digit gives a far larger
 # error.
@@ -99,28 +120,6 @@ def read_suspension(section: Section, case: Case) -> SuspensionTable:
     both = () if travel is None or beside is None else (travel, beside)
     vehicle, other = (replace(each, travel=both) for each in (vehicle, other))
     return SuspensionTable(vehicle, keys.per_travel, other)
-
-
-def direction(section: Section, found: Sequence[float]) -> Vector:
-    """Return the unit vector of a direction of a file.
-
-    Raises:
-        CaseError: it is zero.
-    """
-    if not any(found):
-        raise section.fault("found zero, expected a direction; give one of any other length")
-    length = math.hypot(*found)
-    x, y, z = found
-    return x / length, y / length, z / length
-
-
-def check_point(section: Section, name: str, mechanism: Mechanism) -> None:
-    """Refuse a name without a point.
-
-    Raises:
-        CaseError: there is no such point.
-    """
-    section.require(name, [point.name for point in mechanism.points], "a point")
 
 
 def _kingpin(
@@ -277,3 +276,164 @@ def _key(name: str, value: Any) -> str:
     if name == "kingpin" and not isinstance(value[0], str):
         return "kingpin_links"
     return "center_plane" if name == "middle" else name
+
+
+def _of_wheel(
+    name: str,
+    section: Section,
+    cls: type[SuspensionOutput],
+    table: SuspensionTable | None,
+    case: Case,
+) -> SuspensionOutput:
+    suspension = Section(section.file, "suspension", None)
+    what = f"for {section.key} of type {cls.type!r}"
+    if table is None:
+        raise suspension.fault(f"missing, expected a table {what}; add [suspension]")
+    keys: Any = section.typed(keys_of(cls))
+    if issubclass(cls, AxleOutput) and table.other is None:
+        raise suspension.at("other").fault(
+            f"missing, expected the other wheel {what}; add [suspension.other]"
+        )
+    vehicle = _wheel(section, table, getattr(keys, "side", None))
+    for need in cls.needs:
+        if getattr(vehicle, need) is None:
+            raise suspension.at(need).fault(f"missing, expected it {what}; add it")
+    given: dict[str, Any] = {each.name: getattr(keys, each.name) for each in own_keys(cls)}
+    if issubclass(cls, AxleOutput):
+        given["other"] = table.other
+    _, convert = section.units.of(cls.measure)
+    given_tolerance = tolerance(section, keys, convert, size(case), cls.measure)
+    output = cls(name, vehicle, *given_tolerance, **given)
+    if problem := output.problem:
+        raise section.fault(problem)
+    for each in own_keys(cls):
+        value = given[each.name]
+        names: tuple[str, ...] = (value,) if type(value) is str else value  # of points
+        for point in names if isinstance(names, tuple) else ():  # pyright: ignore[reportUnnecessaryIsInstance]
+            check_point(section.at(each.name), point, case.mechanism)
+    moving = [*case.sweep.path.motions]
+    if isinstance(output, Rate) and len(moving) > 1 and not output.vehicle.travel:
+        raise section.at("type").fault(
+            f"found {output.type!r} while {', '.join(moving)} move, expected one of them to be the"
+            " wheel's travel, for it is a derivative by that; name it by suspension.travel"
+        )
+    return output
+
+
+def _wheel(section: Section, table: SuspensionTable, side: Side | None) -> Vehicle:
+    """Return the vehicle with the wheel of an output."""
+    for wheel in filter(None, (table.vehicle, table.other)):
+        if side in (None, wheel.side):
+            return wheel
+    raise section.at("side").fault(
+        f"found {shown(str(side))}, expected {table.vehicle.side}, the side in [suspension];"
+        " correct it, or add [suspension.other]"
+    )
+
+
+def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...]:
+    """Return the outputs, each output of a wheel followed by its derivative by travel.
+
+    Args:
+        size: size of the mechanism [m]. If a pose error changes an output by d, it changes the
+            slope by about d / size.
+    """
+    both = list[Quantity]()
+    for output in outputs:
+        both.append(output)
+        if isinstance(output, SuspensionOutput) and not isinstance(output, AxleOutput):
+            both.append(PerTravel(output, output.atol / size))
+    return tuple(both)
+
+
+class SuspensionSection(CaseSection):
+    """[suspension], and the outputs of a wheel or an axle."""
+
+    key = "suspension"
+    keys = SuspensionKeys
+    heading = "outputs of a wheel: type, and"
+    remark = (
+        "each with its derivative by wheel travel, jounce: NAME.per_travel [unit/m]; the table"
+        " [suspension] says of which wheel"
+    )
+    types = SuspensionOutput.registry
+
+    def read(self, section: Section, case: Case) -> tuple[Case, SuspensionTable]:
+        """Return the case with its wheels, and the table."""
+        table = read_suspension(section, case)
+        wheels = tuple(each for each in (table.vehicle, table.other) if each)
+        return replace(case, wheels=wheels), table
+
+    def output(
+        self, name: str, section: Section, cls: type[TypedQuantity], table: Any, case: Case
+    ) -> Quantity:
+        """Return the output of a wheel or an axle."""
+        assert issubclass(cls, SuspensionOutput)
+        return _of_wheel(name, section, cls, table, case)
+
+    def with_derived(
+        self, outputs: Sequence[Quantity], table: SuspensionTable | None, size: float
+    ) -> Sequence[Quantity]:
+        """Return the outputs with their derivatives by travel, unless the table wants none."""
+        return with_slopes(outputs, size) if table is not None and table.per_travel else outputs
+
+    def convention(self, section: Section) -> str:
+        """Return the convention of signs of the vehicle."""
+        return str(section.at("convention").value or "")
+
+    def lines(self, case: Case) -> Sequence[str]:
+        """Return the lines of the vehicle."""
+        return suspension_lines(case)
+
+    def further(self, case: Case, output: TypedQuantity) -> Iterator[tuple[str, Any]]:
+        """Yield the side of a wheel, if the case has several."""
+        if isinstance(output, WheelOutput) and len(wheels_of(case)) > 1:
+            yield "side", output.vehicle.side
+
+    def wheels(self, case: Case) -> Mapping[str, SceneWheel]:
+        """Return the wheels of outputs; those without a radius cannot be drawn."""
+        from ...harness.scene_record import SceneWheel
+
+        outputs = [each for each in case.outputs if isinstance(each, SuspensionOutput)]
+        found: dict[str, SceneWheel] = {}
+        for vehicle in (vehicle for output in outputs for vehicle in output.vehicles):
+            if (radius := vehicle.radius(case.mechanism)) is not None:
+                center = case.mechanism.point(vehicle.wheel_center)
+                moved = {case.sweep.driver, *case.sweep.motions}
+                alone = not vehicle.travel or moved <= {*vehicle.travel}
+                two = len(vehicle.kingpin or ()) == len(vehicle.kingpin_points) == 2
+                found[center.name] = SceneWheel(
+                    body=center.body,
+                    center=list(center.position),
+                    spin=[float(x) for x in vehicle.spin(case.mechanism)],
+                    up=list(vehicle.up),
+                    radius=radius,
+                    kingpin=[*vehicle.kingpin_points] if two else [],
+                    middle=[*vehicle.middle] if alone else [],
+                )
+        return found
+
+    def springs(self, case: Case) -> Iterator[tuple[tuple[Vector, Vector], tuple[str, str], bool]]:
+        """Yield the springs and dampers of motion ratios."""
+        for output in case.outputs:
+            if isinstance(output, MotionRatio):
+                a, b = (case.mechanism.point(name) for name in output.between)
+                yield (a.position, b.position), (a.body, b.body), "damper" in output.name
+
+    def definitions(
+        self, case: Case, output: str, values: Mapping[str, Array]
+    ) -> Iterator[tuple[str, Callable[[Array], Array]]]:
+        """Yield the camber seen from the front, if toe is known."""
+        camber = next(each for each in case.outputs if each.name == output)
+        if not isinstance(camber, Camber):
+            return
+        for toe in case.outputs:
+            if isinstance(toe, Toe) and toe.vehicle == camber.vehicle and toe.name in values:
+                yield (
+                    f"taken as the camber seen from the front, with tan(seen) cos({toe.name}) ="
+                    f" tan({camber.name}),",
+                    partial(camber_of_front_view, toe=values[toe.name]),
+                )
+
+
+SECTION = SuspensionSection()

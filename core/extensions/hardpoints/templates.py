@@ -155,6 +155,14 @@ def side_of(name: str) -> tuple[str, str]:
     return plain, ""
 
 
+def head_of_corner(column: str) -> str:
+    """Return what a column of corners tells, by its head: "corner", "axle" or "side"; an empty text
+    of any other column.
+    """
+    word = compact(column)
+    return next((what for what, words in NAMES["heads"].items() if word in words), "")
+
+
 def corner_of(text: str, column: str = "") -> tuple[str, str] | None:
     """Return the axle and the side in the name of a corner: ("front", "left") for "FL", ("rear",
     "") for "rear"; None for another text.
@@ -163,7 +171,7 @@ def corner_of(text: str, column: str = "") -> tuple[str, str] | None:
         column: head of the column of the text; below "side", "R" is right, below "axle" rear.
     """
     word = compact(text)
-    if (head := compact(column)) in ("axle", "side"):
+    if (head := head_of_corner(column)) in ("axle", "side"):
         name = next((name for name, words in NAMES[head].items() if word in words), "")
         return ((name, "") if head == "axle" else ("", name)) if name else None
     return _CORNERS.get(word)

@@ -18,12 +18,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
-from ...case.io.document import fault, parse, parse_yaml, shown, unknown_name
-from ...case.io.reader_options import NOTHING, Supplied
+from ...case.io.document import fault, parse, shown, unknown_name
 from ...case.io.table import is_number
+from ...case.io.toml_text import parse_yaml
 from ...case.units import LENGTHS
 from ...errors import brief, remedy, shortened
 from ...mechanism.mechanism import Vector
+from .options import NOTHING, WheelOptions
 from .programs import without_comments
 from .table import (
     Hardpoint,
@@ -63,6 +64,9 @@ _AXLES = [
     re.compile(rf"{axle}(?:_(?:left|{_OF}))?|(?:{_OF})_{axle}|{axle[0]}l?|l{axle[0]}")
     for axle in ("front", "rear")
 ]
+_UNIT_KEYS = ("unit", "units", "length_unit", "length_units", "length")
+_AXES_KEYS = ("axes", "coordinate_system", "frame", "axis_system")
+_TYPE_KEYS = ("type", "template", "suspension_type", "suspension")
 _NUMBER = r"[-+\u2212]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _ASSIGNED = re.compile(
     r"\s*(?:(?:const|let|var|static|final|double|set)\s+)*"
@@ -105,7 +109,7 @@ class Leaf:
         return ((*above, split[0]), split[1]) if split else None
 
 
-def read_tree(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+def read_tree(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
     """Return the points of a YAML, JSON or TOML file.
 
     Args:
@@ -121,7 +125,7 @@ def read_tree(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointT
     return _table(file, "YAML", [*_leaves(parse_yaml(file, text))], supplied)
 
 
-def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+def read_python(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
     """Return the points of the assignments of a Python script, dictionaries among them. Nothing is
     evaluated; what is no number, text, list or dictionary of these is left out and listed.
 
@@ -250,7 +254,7 @@ def is_assignments(lines: Sequence[tuple[str, str]]) -> bool:
 
 
 def read_assignments(
-    file: Path, lines: Sequence[tuple[str, str]], facts: dict[str, str], supplied: Supplied
+    file: Path, lines: Sequence[tuple[str, str]], facts: dict[str, str], supplied: WheelOptions
 ) -> HardpointTable:
     """Return the points of assignments.
 
@@ -331,7 +335,11 @@ def _split_name(item: Any) -> tuple[str, Any]:
 
 
 def _table(
-    file: Path, tool: str, tree: Sequence[Leaf], supplied: Supplied, left_out: Sequence[str] = ()
+    file: Path,
+    tool: str,
+    tree: Sequence[Leaf],
+    supplied: WheelOptions,
+    left_out: Sequence[str] = (),
 ) -> HardpointTable:
     """Return the points of a tree."""
     points, others = _points(file, tree)
@@ -352,8 +360,8 @@ def _table(
     values = {leaf.keys: leaf.value for leaf in others}
     millimetres = length_name(facts.get("unit", "")) == "mm"
     found |= _wheel_points(found, values, millimetres=millimetres)
-    listed = [*left_out, *dropped]
-    if unused := [leaf.where for leaf in others if leaf.value not in facts.values()]:
+    listed, said = [*left_out, *dropped], [*facts.values()]
+    if unused := [leaf.where for leaf in others if not (_fact_key(leaf) and leaf.value in said)]:
         listed.append(f"values {shortened([brief(each) for each in unused], 8)}")
     return HardpointTable(
         *(file, tool, found, facts.get("unit"), facts.get("axes"), facts.get("template"), listed),
@@ -397,6 +405,12 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
     return points, others
 
 
+def _fact_key(leaf: Leaf) -> bool:
+    """Return whether a value has the key of a fact."""
+    key = normal(leaf.keys[-1]) if leaf.keys else ""
+    return key == "side" or any(key in keys for keys in (_UNIT_KEYS, _AXES_KEYS, _TYPE_KEYS))
+
+
 def _facts(others: Sequence[Leaf]) -> dict[str, str]:
     """Return unit, axes and template, if the tree names them."""
     facts = dict[str, str]()
@@ -404,14 +418,12 @@ def _facts(others: Sequence[Leaf]) -> dict[str, str]:
         if not leaf.keys or not isinstance(leaf.value, str):
             continue
         key, value = normal(leaf.keys[-1]), leaf.value.strip()
-        if key in ("unit", "units", "length_unit", "length_units", "length"):
+        if key in _UNIT_KEYS:
             if length_name(value) in LENGTHS or key != "length":
                 facts.setdefault("unit", value)
-        elif key in ("axes", "coordinate_system", "frame", "axis_system") and is_axes(value):
+        elif key in _AXES_KEYS and is_axes(value):
             facts.setdefault("axes", value)
-        elif key in ("type", "template", "suspension_type", "suspension") and (
-            compact(value) in TEMPLATE_NAMES
-        ):
+        elif key in _TYPE_KEYS and compact(value) in TEMPLATE_NAMES:
             facts.setdefault("template", value)
         elif key == "side" and value.lower() in ("left", "right"):
             facts.setdefault("side", value)
@@ -419,7 +431,7 @@ def _facts(others: Sequence[Leaf]) -> dict[str, str]:
 
 
 def _of_one_suspension(
-    file: Path, paths: Sequence[Keys], supplied: Supplied
+    file: Path, paths: Sequence[Keys], supplied: WheelOptions
 ) -> tuple[dict[Keys, str], list[str], tuple[str, str] | None]:
     """Return the names of the points of one suspension by their paths, what was left out, and the
     corner that keys name, if it is asked for.

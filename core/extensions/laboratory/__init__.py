@@ -6,5 +6,6 @@ EXTENSION = Extension(
     __name__,
     needs=["proofs", "sweep", "compliance"],
     commands={"bench": "command:BenchAll", "stress": "command:StressEngines"},
+    sources={"bench": "source:BenchOfRun"},
     completions={"family": "stress.families:FAMILIES"},
 )

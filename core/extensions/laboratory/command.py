@@ -11,6 +11,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
+from ...case.io.reader_options import Supplied
 from ...cli.parser import Command
 from ...cli.registry import Registry, Status, names_of_given
 from ...cli.shared_options import MODE, MODES, TOL
@@ -206,6 +207,30 @@ class BenchCompliance(Command):
 
 
 @options
+class BenchCurves(Command):
+    """Measure the time of all outputs of many designs against their kinematics alone, and of exact
+    slopes by the geometry.
+    """
+
+    about = "outputs of many designs, and their slopes by the geometry"
+    case: str = argument("table of hardpoints", "TABLE")
+    axle: str | None = option("motion of both wheels", metavar="MOTION")
+    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    json: str | None = json_file()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ...report.terminal import with_json
+        from .bench.curves import lines, measure
+
+        case = registry.find_case(self.case, Supplied(axle=self.axle), driven=False)
+        found = measure(case, self.rounds)
+        with with_json(found, self.json) as console:
+            print(*lines(found), sep="\n", file=console.file)
+        return Status.WITHIN
+
+
+@options
 class BenchAll(Command):
     """Measure the engines on a few cases, and the formulation. This takes some minutes."""
 
@@ -214,6 +239,7 @@ class BenchAll(Command):
         "engines": BenchEngines,
         "formulation": BenchFormulation,
         "compliance": BenchCompliance,
+        "curves": BenchCurves,
     }
     out: Path | None = destination("write bench.json and bench.html there", Path, "DIR")
     json: str | None = json_file()

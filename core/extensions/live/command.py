@@ -86,7 +86,8 @@ class Serve(Command):
             _measure_edits(read(), wanted)
             if self.no_browser:
                 return Status.WITHIN
-        server = self._server(registry, read, port=self.port, once=self.once)
+        how = {"port": self.port, "once": self.once, "measuring": wanted > 0}
+        server = self._server(registry, read, **how)
         try:
             address = server.address + f"&measure={wanted}" * bool(wanted)
             print(address, flush=True)
@@ -112,7 +113,7 @@ class Serve(Command):
 
     def _reader(self, registry: Registry) -> Callable[[], Live]:
         """Return the function that opens a table of hardpoints, or any other mechanism."""
-        from ...case.models.files import is_table
+        from ..hardpoints.reader import is_table
         from .model import LiveModel
         from .table import LiveTable
 

@@ -98,6 +98,7 @@ class LiveServer:
         judge: solves by these engines.
         port: of this machine; 0 for a free one.
         once: whether to end when no page is open any more.
+        measuring: whether to end when a page has measured its edits.
         framed: whether notebooks of this machine may show the page.
 
     Attributes:
@@ -118,11 +119,13 @@ class LiveServer:
         *,
         port: int = 0,
         once: bool = False,
+        measuring: bool = False,
         framed: bool = False,
     ) -> None:
         serving: Any = library("kincheck serve", "websockets.sync.server", "live")
         self.file, self.open_file, self.built_in = file, open_file, not file.is_file()
-        self.engines, self.judge, self.once = engines, judge, once
+        self.engines, self.judge = engines, judge
+        self.once, self.measuring = once, measuring
         self.points: Rows | None = None
         frames = NOTEBOOKS if framed else "'none'"
         policy = f"{HEADERS['Content-Security-Policy']}; frame-ancestors {frames}"
@@ -283,21 +286,23 @@ class Conversation:
             Thread(target=self._work, args=(kinds, closed), daemon=True)
             for kinds in ((Solve, Move, Read, Save, Rank, Vary, Reach), (Check, Export))
         ]
-        with suppress(closed):
-            self.tell(self.live.opening(self.server.engines))
-            for thread in threads:
-                thread.start()
-            began, count = monotonic(), 0
-            while count < MOST_MESSAGES:
-                self._receive(self.socket.recv())
-                count += 1
-                if monotonic() - began > 1.0:
-                    began, count = monotonic(), 0
-            self.tell(Invalid(message=f"found more than {MOST_MESSAGES} messages in a second"))
-            self.socket.close(POLICY)
-        with self.news:
-            self.closed = True
-            self.news.notify_all()
+        try:
+            with suppress(closed):
+                self.tell(self.live.opening(self.server.engines))
+                for thread in threads:
+                    thread.start()
+                began, count = monotonic(), 0
+                while count < MOST_MESSAGES:
+                    self._receive(self.socket.recv())
+                    count += 1
+                    if monotonic() - began > 1.0:
+                        began, count = monotonic(), 0
+                self.tell(Invalid(message=f"found more than {MOST_MESSAGES} messages in a second"))
+                self.socket.close(POLICY)
+        finally:
+            with self.news:
+                self.closed = True
+                self.news.notify_all()
 
     def tell(self, message: Told) -> None:
         """Send a message."""
@@ -310,6 +315,9 @@ class Conversation:
             self.tell(Invalid(message=f"message: {error}"))
             return
         if isinstance(message, Measured):
+            if not self.server.measuring:
+                self.tell(Invalid(id=message.id, message="measured: nobody asked for it"))
+                return
             self.server.measured += message.milliseconds
             self.server.ended.set()
             return

@@ -16,20 +16,20 @@ from numpy.typing import NDArray
 
 from ...case.case import PER_TRAVEL, Case, without_forces
 from ...case.designs import DesignOutputs
-from ...case.io.reader_options import Supplied
-from ...case.models.files import read_hardpoints
 from ...case.quantity import Output, Quantity
 from ...errors import KincheckError, unknown
 from ...harness.labels import output_label
 from ...harness.provenance import case_facts
 from ...harness.scene import scene
 from ...kinematics import places, require_driven
-from ...program.llvm.compiler import available
+from ...program.llvm.machine_code import available
 from ...report.axis import DISPLAY, Axis, driver_axis
 from ...report.drawing import drawing
 from ...trajectory import Array
 from ...unit_text import unit_text
+from ..hardpoints.options import WheelOptions
 from ..hardpoints.read import case_of_hardpoints
+from ..hardpoints.reader import read_hardpoints
 from ..hardpoints.saving import free_name, save_table
 from ..hardpoints.table import Hardpoint, axes_of, number, unit_of
 from ..sweep.conformance import histogram
@@ -107,7 +107,7 @@ class LiveTable(LiveFile):
     def __init__(
         self,
         file: Path,
-        supplied: Supplied,
+        supplied: WheelOptions,
         referenced: Callable[[Case], Case] = lambda case: case,
         vary: Path | None = None,
     ) -> None:

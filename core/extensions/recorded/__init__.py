@@ -2,4 +2,6 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, needs=["trees"])
+EXTENSION = Extension(
+    __name__, sources={"recordings": "source:Recordings", "program": "source:Program"}
+)

@@ -28,7 +28,14 @@ from ...case.io.case_file import case_text
 from ...case.io.document import fault
 from ...case.io.reference_samples import RATES
 from ...case.measures import ForceMeasure
-from ...errors import CaseError, KincheckError, SolveError, UnsupportedError, number_of
+from ...errors import (
+    CaseError,
+    KincheckError,
+    SolveError,
+    UnsupportedError,
+    number_of,
+    shortened,
+)
 from ...harness.compare import output_series
 from ...harness.engine import RECORDED
 from ...harness.native_engine import NativeEngine
@@ -103,12 +110,13 @@ class RecordedEngine:
             message: on the others.
         """
         outputs = {output.name: self._series(case, output) for output in case.outputs}
+        turned = [self._whole_turns(output, outputs[output.name]) for output in case.outputs]
         judged = judge_rows(case, self.samples, self.accuracy)
         standard = {**self._native, **case.reference}
         columns = {name: each.values for name, each in self.samples.numbers.items()}
         values = self.resampled.lead, self.resampled.values, self._solve_sweep
         slips = explain_slips(case, outputs, columns, standard, self._columns, *values)
-        notes = [*slips, *self.samples.notes, *self.resampled.notes]
+        notes = [*slips, *filter(None, turned), *self.samples.notes, *self.resampled.notes]
         if gaps := self.samples.gaps:
             listed = ", ".join(f"{name} at {number_of(n, 'sample')}" for name, n in gaps.items())
             notes.append(f"not judged where nothing is recorded: {listed}")
@@ -162,6 +170,24 @@ class RecordedEngine:
             if x is not None
         }
         return Series(position, *values[1:], uncertainty=uncertainty)
+
+    def _whole_turns(self, output: Quantity, found: Series) -> str:
+        """Return a sentence on the whole turns by which a column differs from an output; empty
+        without any.
+        """
+        column = self.samples.numbers.get(output.name)
+        if column is None or not output.period:
+            return ""
+        turns = np.round((column.values - found.position) / output.period)
+        rows = np.flatnonzero(np.nan_to_num(turns))
+        if not rows.size:
+            return ""
+        which = [*dict.fromkeys(f"{n:+.0f}" for n in turns[rows].tolist())]
+        where = f"at {len(rows)} of {number_of(len(turns), 'sample')}, first at {rows[0]}"
+        if len(rows) == len(turns):
+            where = "at all samples"
+        listed = shortened(which, 3, " or ")
+        return f"{output.name}: the recording is off by whole turns, {listed}, {where}: left out"
 
     def _of_poses(self, case: Case, output: Quantity) -> tuple[list[Array | None], list[Array]]:
         """Return an output by the recorded poses, and the share of their digits."""
@@ -385,7 +411,7 @@ def read_answer(name: str, case: Case, file: Path) -> Reported:
         found = Reader(file, case, heads).read([])
         inputs = inputs_of(case)
         numbers = {key: use for key, use in found.numbers.items() if key not in inputs}
-        meanings.append(Meaning(numbers, found.bodies))
+        meanings.append(Meaning(numbers, found.bodies, unknown=found.unknown))
         return sorted({use.column for use in meanings[-1].uses})
 
     recording = read_recording(file, choose)

@@ -22,13 +22,14 @@ import numpy as np
 
 from ...case.case import TIME, Case
 from ...case.io.document import fault, read_bytes
+from ...case.io.element import Element, parse_xml
+from ...case.io.foreign import too_large
 from ...case.io.reference_samples import RATES
-from ...errors import MOST_NAMED, KincheckError, brief, shortened
+from ...errors import MOST_NAMED, CaseError, KincheckError, brief, shortened
 from ...extras import how_to_install, installed_version
 from ...harness.trajectory_check import Reported
 from ...trajectory import Array
 from ...unit_text import value_text
-from ..trees.element import Element, parse_xml
 from .engine import RecordedEngine
 from .meaning import MAP, Meaning, Reader, Use, inputs_of, unit_of
 from .readers import Column, Head, Recording
@@ -36,6 +37,9 @@ from .samples import samples_of
 from .sweep import at_own_samples
 
 LARGEST_FMU, LARGEST_DESCRIPTION = 1_000_000_000, 64_000_000
+# Sizes when unpacked; beyond the usual one an FMU shrinks no more than by this ratio.
+USUAL_SIZE, RATIO = 256_000_000, 20
+LESS = "export it without resources"
 _REALS = ("Real", "Float64")
 # Halving the step of a method of first order halves its error: the rest is as large as the change.
 # Once more for higher orders.
@@ -272,14 +276,19 @@ def read_fmu(file: Path, case: Case, maps: Sequence[str]) -> FmuEngine:
 
 def _description(file: Path) -> tuple[Element, Sequence[str]]:
     """Return the model description and the names of all files in an FMU."""
-    data = read_bytes(file, LARGEST_FMU, "export it without resources")
+    data = read_bytes(file, LARGEST_FMU, LESS)
     try:
+        # machine code shrinks to a third, and tables to a tenth
+        if problem := too_large(data, min(max(USUAL_SIZE, RATIO * len(data)), 4 * LARGEST_FMU)):
+            raise fault(file, "", f"{problem}; {LESS}")
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             names = archive.namelist()
             size = archive.getinfo("modelDescription.xml").file_size
             if size > LARGEST_DESCRIPTION:
                 raise fault(file, "", f"describes itself in {size} bytes; export fewer variables")
             text = archive.read("modelDescription.xml").decode("utf-8")
+    except CaseError:  # it is a ValueError too
+        raise
     except (zipfile.BadZipFile, zlib.error, ValueError, KeyError, RuntimeError, EOFError, OSError):
         problem = "found no model description in a zip archive, expected an FMU"
         raise fault(file, "", f"{problem}; export it anew") from None

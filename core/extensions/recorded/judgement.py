@@ -20,7 +20,7 @@ from ...kinematics import Needed, Residuals, Worst, needed_forces, replay_motion
 from ...mechanism.mechanism import Mechanism
 from ...trajectory import PER_TIME, QUANTITIES, Array, BodyMotion
 from ...unit_text import value_text
-from .meaning import REACTIONS, Accuracy, Meaning, all_readings
+from .meaning import REACTIONS, Accuracy, Meaning, all_readings, si_values
 from .samples import Samples, driven_angles, samples_of
 
 # A wrong reading leaves far more than a right one: the digits of those that leave less than this
@@ -34,7 +34,8 @@ class Judged:
     """The rest that recorded poses leave of the rows.
 
     Attributes:
-        largest: by quantity, the largest residual [m, m/s, m/s^2].
+        largest: by quantity, the largest residual [m, m/s, m/s^2]; of "attitude", by how much a
+            quaternion's length is off, if out of tolerance.
         faults: sentences on residuals out of tolerance.
         not_judged: joints of a body without poses, and the body.
         begun: coupled joints that begin after whole turns, and how many.
@@ -55,6 +56,11 @@ def judge_rows(case: Case, samples: Samples, accuracy: Accuracy) -> Judged:
     allowed = _tolerances(case, samples, accuracy)
     largest = dict[str, float]()
     faults = list[str]()
+    for name, pose in samples.meaning.bodies.items():
+        if not pose.reading.angles and (off := _wrong_length(samples, name, accuracy)):
+            largest["attitude"] = max(off[0], largest.get("attitude", 0.0))
+            faults.append(off[1])
+    gaps = len(faults)
     for quantity, per_time in zip(QUANTITIES, PER_TIME, strict=True):
         worst = found.worst(quantity, allowed[quantity])
         if worst is None:
@@ -62,12 +68,36 @@ def judge_rows(case: Case, samples: Samples, accuracy: Accuracy) -> Judged:
         left: Array = getattr(found, quantity)
         largest[quantity] = float(np.nanmax(np.abs(left)))
         if worst.value > worst.allowed:
-            fits = _fitting_readings(case, samples, allowed["position"]) if not faults else ""
+            fits = (
+                _fitting_readings(case, samples, allowed["position"]) if len(faults) == gaps else ""
+            )
             faults.append(
                 _sentence(found, quantity, worst, allowed[quantity], f"m{per_time}") + fits
             )
     turned = {name.rpartition(".")[0]: n for name, n in found.begun.items() if n}
     return Judged(largest, faults, found.not_judged, turned)
+
+
+def _wrong_length(samples: Samples, name: str, accuracy: Accuracy) -> tuple[float, str] | None:
+    """Return by how much the length of a body's quaternions is off one, and a sentence; None if
+    within tolerance.
+    """
+    uses = samples.meaning.bodies[name].groups["attitude"]
+    parts = [si_values(samples.recording, use) for use in uses]
+    length = np.sqrt(sum(each.values**2 for each in parts))
+    digits = sum(np.abs(each.values) * each.half for each in parts) / np.maximum(length, 0.5)
+    off = np.abs(length - 1.0)
+    allowed = CONSTRAINED + accuracy.shares.get("position", 0.0) + digits
+    bad = np.flatnonzero(off > allowed)
+    if not bad.size:
+        return None
+    k = int(bad[off[bad].argmax()])
+    text = (
+        f"the recorded attitude of {name} is a quaternion of length {length[k]:.9g} at sample {k},"
+        f" expected 1, tolerance {allowed[k]:.3g}; {len(bad)} of {samples.count} samples are off:"
+        " correct its columns"
+    )
+    return float(off[k]), text
 
 
 def _tolerances(case: Case, samples: Samples, accuracy: Accuracy) -> dict[str, float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from itertools import product
 from operator import mul
@@ -21,8 +21,9 @@ from ...algebra import Quat, Vec3, X, Y, Z, quat
 from ...case.case import TIME, Case, Quantity
 from ...case.io.document import decimal, fault, number_or_nan, require_known, shown, unknown_name
 from ...case.io.reference_samples import RATES, known_columns
-from ...case.io.table import read_unit, require_unit
-from ...errors import MOST_NAMED, brief, shortened
+from ...case.io.table import UNIT_NAMES, read_unit, require_unit
+from ...case.units import ANGLES
+from ...errors import MOST_NAMED, brief, shortened, similar
 from ...trajectory import QUANTITIES, Array
 from .readers import Column, Head, Recording
 
@@ -31,6 +32,8 @@ SEQUENCES = tuple(
 )
 """The twelve sequences of axes; 1 is x."""
 ORDERS = ("wxyz", "xyzw")
+PLANE = "3"
+"""One angle, about global z: the attitude of a planar pose."""
 _AXIS_OF: dict[str, Vec3] = {"1": X, "2": Y, "3": Z}
 
 
@@ -39,7 +42,7 @@ class Reading:
     """The meaning of the numbers of an attitude.
 
     Attributes:
-        order: of the axes of three angles, or of the parts of a quaternion.
+        order: of the axes of three angles or of one, or of the parts of a quaternion.
         fixed: whether the angles are about fixed axes, and not about those of the body.
         inverted: whether they turn global axes into those of the body.
     """
@@ -51,7 +54,7 @@ class Reading:
     @property
     def angles(self) -> bool:
         """Whether the numbers are angles."""
-        return self.order in SEQUENCES
+        return self.order in (*SEQUENCES, PLANE)
 
     def __str__(self) -> str:
         """Return its words in --map."""
@@ -63,7 +66,7 @@ class Reading:
         """Return Euler parameters of body -> global, shape (n, 4).
 
         Args:
-            numbers: three angles [rad], or four parts of any length but zero, shape (n,) each.
+            numbers: angles [rad], or four parts of any length but zero, shape (n,) each.
         """
         if self.angles:
             turns = [
@@ -81,8 +84,10 @@ class Reading:
 
 
 def all_readings(count: int) -> list[Reading]:
-    """Return all readings of three angles or of four parts of a quaternion."""
+    """Return all readings of one or three angles or of four parts of a quaternion."""
     flags = (False, True)
+    if count == 1:
+        return [Reading(PLANE, inverted=inverted) for inverted in flags]
     if count == 4:
         return [Reading(order, inverted=inverted) for order in ORDERS for inverted in flags]
     return [Reading(*each) for each in product(SEQUENCES, flags, flags)]
@@ -90,6 +95,8 @@ def all_readings(count: int) -> list[Reading]:
 
 MAP = "--map"
 EVENT = "event"
+# A name this similar to another one is that with a typing error.
+CLOSE = 0.75
 _AXES = {"x": "1", "y": "2", "z": "3"}
 _OF_MOTION = {"velocity": "m/s", "omega": "rad/s", "acceleration": "m/s^2", "alpha": "rad/s^2"}
 _UNITS = {"position": "m", "attitude": "rad", **_OF_MOTION}
@@ -114,7 +121,8 @@ _IN_BRACKETS = re.compile(r"(.*?)\s+\[([^\[\]]*)\]")
 _QUATERNIONS = {"wxyz": ("e0", "e1", "e2", "e3"), "xyzw": ("qx", "qy", "qz", "qw")}
 FORM = (
     'say --map "NAME=COLUMN", "NAME=-COLUMN+12 [mm]", or of a body --map "BODY=PREFIX: x y z, euler'
-    ' 321 a b c [deg]" or "BODY=PREFIX: x y z, quaternion xyzw qx qy qz qw"'
+    ' 321 a b c [deg]", "BODY=PREFIX: x y z, quaternion xyzw qx qy qz qw" or, planar,'
+    ' "BODY=PREFIX: x y angle"'
 )
 
 ACCURACY = "--accuracy"
@@ -145,7 +153,8 @@ class Pose:
     """The columns of the pose of a body, and their meaning.
 
     Attributes:
-        groups: columns by position, attitude, velocity, omega, acceleration and alpha.
+        groups: columns by position, attitude, velocity, omega, acceleration and alpha; of a planar
+            pose x and y, or one about z.
         turned: omega and alpha, if along the axes of the recorded frame.
         frame: origin and Euler parameters of the recorded frame at design, global; empty for the
             body's own frame, None for the frame whose first sample is the design pose.
@@ -166,11 +175,13 @@ class Meaning:
         bodies: poses by body.
         event: which of several rows at one time is taken, "first" or "last"; empty if they must be
             equal.
+        unknown: columns without a meaning.
     """
 
     numbers: Mapping[str, Use]
     bodies: Mapping[str, Pose]
     event: str = ""
+    unknown: Sequence[str] = ()
 
     @property
     def uses(self) -> list[Use]:
@@ -242,7 +253,15 @@ class Reader:
             known = shortened([*map(brief, [n for n in self.targets if n != TIME][:6])], MOST_NAMED)
             problem = f"found the columns {listed or 'none'}, expected one of {known}, or poses"
             raise fault(self.file, "", f"{problem} of {', '.join(prefixes)}; {FORM}")
-        return Meaning(numbers, bodies, event)
+        found = Meaning(numbers, bodies, event)
+        taken = {use.column for use in found.uses}
+        left = [head.name for k, head in enumerate(self.heads) if k not in taken]
+        known = [name for name in self.targets if name not in numbers]
+        # a typing error, and not one of thousands of other quantities
+        close = {name: similar(name, known, CLOSE) for name in left[:MOST_NAMED]}
+        hints = [f"{shown(name)} (is it {other}?)" for name, other in close.items() if other]
+        others = [shown(name) for name in left if not close.get(name)]
+        return replace(found, unknown=[*hints, *others])
 
     def _fault(self, problem: str) -> Exception:
         return fault(self.file, MAP, problem)
@@ -327,12 +346,29 @@ class Reader:
                 raise self._fault(f"{problem}; {FORM}")
             named = (self._column(name, prefix.strip() if colon else "") for name in names)
             groups[what] = tuple(Use(k, si, unit) for k in named)
+        if "attitude" not in groups and self._is_planar(groups.get("position", ())):
+            *place, angle = groups["position"]
+            turns = angle.unit in ANGLES
+            groups["position"] = tuple(
+                replace(use, unit="" if turns else use.unit) for use in place
+            )
+            groups["attitude"] = (replace(angle, si="rad", unit=angle.unit if turns else ""),)
+            reading = Reading(PLANE)
         lacking = [each for each in ("position", "attitude") if each not in groups]
         lacking += [b for a, b in _NEEDS if a in groups and b not in groups]
         if lacking:
             problem = f"found {shown(text)} without {' and '.join(lacking)}, expected them"
             raise self._fault(f"{problem}; {FORM}")
         return Pose(groups, reading, tuple(turned), frame)
+
+    def _is_planar(self, position: Sequence[Use]) -> bool:
+        """Return whether the third of three columns is an angle, by its unit or else its name."""
+        if len(position) < 3:
+            return False
+        head, stated = self.heads[position[2].column], position[2].unit
+        if unit := head.unit or (stated if stated in ANGLES else ""):
+            return UNIT_NAMES.get(unit.lower(), unit.lower()) in (*ANGLES, "mrad")
+        return not head.name.lower().endswith("z")
 
     def _reading(self, key: str, words: Sequence[str]) -> tuple[Reading, list[str]]:
         """Return the reading of words, and the words after it."""

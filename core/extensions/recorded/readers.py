@@ -1,6 +1,6 @@
 """Recordings: columns of numbers over samples in a file of another program. They are read of
-tables, motions of OpenSim (.mot, .sto), results of Adams in XML (.res), and MAT-files: results of
-Modelica tools (level 4), and matrices and structs of MATLAB (level 5).
+tables, records of JSON, motions of OpenSim (.mot, .sto), results of Adams in XML (.res), and
+MAT-files: results of Modelica tools (level 4), and matrices and structs of MATLAB (level 5).
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ import numpy as np
 
 from ...case.curves import Printed
 from ...case.io.document import decimal, fault, read_bytes, read_text, shown
+from ...case.io.element import Element, parse_xml
 from ...case.io.reference_samples import RATES, layout_of, read_table, samples_of
 from ...case.io.table import Table, unit_of_head
 from ...errors import MOST_NAMED, CaseError, brief, remedy, shortened
 from ...trajectory import Array
-from ..trees.element import Element, parse_xml
+from .records import JSON, table_of_json
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,11 @@ def column_of(file: Path, where: str, head: Head, cells: Iterable[str]) -> Colum
             raise fault(file, f"{where} {k}", f"found {shown(cell)}, {expected}") from None
         printed.add(cell)
     found = np.array(values)
-    return Column(head, np.where(np.isfinite(found), found, np.nan), printed.half(found))
+    return Column(
+        head,
+        np.where(np.isfinite(found), found, np.nan),
+        printed.half(np.nan_to_num(found), alone=True),
+    )
 
 
 _UNIT = re.compile(r"\[([^\]|]*)")
@@ -278,8 +283,12 @@ def read_recording(
 
 
 def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
-    opensim = file.suffix.lower() in _OPENSIM
-    table = _wide_table(read_table(file, sheet, "--sheet NAME", _END if opensim else ""))
+    opensim, notes = file.suffix.lower() in _OPENSIM, list[str]()
+    if file.suffix.lower() in JSON and sheet is None:
+        table, notes = table_of_json(file, LARGEST_FILE, LESS)
+    else:
+        table = read_table(file, sheet, "--sheet NAME", _END if opensim else "")
+    table = _wide_table(table)
     layout = layout_of(table)
     chosen = choose([Head(*unit_of_head(file, layout.where, text)) for text in layout.heads])
     samples = samples_of(table, chosen, remarks=True, gaps=True)
@@ -288,9 +297,9 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
         chosen, samples.numbers.T, samples.printed, samples.columns, strict=True
     ):
         head = Head(*unit_of_head(file, layout.where, text))  # with the unit of a row of units
-        columns[k] = Column(head, values, printed.half(np.nan_to_num(values)))
+        columns[k] = Column(head, values, printed.half(np.nan_to_num(values), alone=True))
     rows = shortened(samples.left_out, MOST_NAMED)
-    notes = [f"{file}: left out the rows without numbers: {rows}"] if rows else []
+    notes += [f"{file}: left out the rows without numbers: {rows}"] if rows else []
     if not opensim:
         return Recording(file, columns, notes=notes)
     stated = _DEGREES.search(read_text(file, LARGEST_FILE, LESS))

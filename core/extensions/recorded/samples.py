@@ -4,7 +4,6 @@ bodies, with what their printed digits allow.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...algebra import ZERO, Vec3, cross, quat, vec
 from ...case.case import TIME, Case, Quantity
-from ...case.curves import are_even_steps, have_common_factor
+from ...case.curves import is_set
 from ...case.io.document import fault, shown
 from ...case.measures import coordinate_of
 from ...case.quantity import point_jets, still_jets, with_markers
@@ -30,11 +29,6 @@ from ...primitives.base import Twist
 from ...trajectory import Array, BodyMotion, PointMotion
 from .meaning import EVENT, MAP, Meaning, Pose, si_values, unit_of
 from .readers import Column, Recording
-
-# Two steps may be equal by chance.
-FEWEST = 3
-# As many whole numbers have no common factor by chance.
-MANY = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +88,7 @@ def samples_of(
     notes = [*recording.notes]
     kept = recording
     if not whole:
-        notes += _notes_on_units(recording, meaning)
+        notes += _notes_on_columns(recording, meaning)
         kept = replace(recording, columns=_columns_of_samples(case, recording, meaning, notes))
     numbers = {name: si_values(kept, use) for name, use in meaning.numbers.items()}
     motions = dict[str, BodyMotion]()
@@ -126,8 +120,10 @@ def samples_of(
     return samples_of(case, rest, meaning, digits=digits)
 
 
-def _notes_on_units(recording: Recording, meaning: Meaning) -> Iterator[str]:
-    """Yield a note on columns whose unit neither the file nor --map states."""
+def _notes_on_columns(recording: Recording, meaning: Meaning) -> Iterator[str]:
+    """Yield notes on columns of unknown names, and on those whose unit neither the file nor --map
+    states.
+    """
     bare = {
         recording.columns[use.column].head.name: use.si
         for use in meaning.uses
@@ -140,6 +136,9 @@ def _notes_on_units(recording: Recording, meaning: Meaning) -> Iterator[str]:
         if head.unit and unit != head.unit:
             text = f"column {head.name} is taken in {unit}, as stated, and not in {head.unit}"
             yield f"{recording.file}: {text}"
+    if meaning.unknown:
+        listed = shortened([*meaning.unknown], MOST_NAMED)
+        yield f"{recording.file}: columns of no known name are left out: {listed}"
     if bare:
         units = " and ".join(dict.fromkeys(bare.values()))
         names = shortened([*bare], MOST_NAMED)
@@ -188,24 +187,11 @@ def _columns_of_samples(
             notes.append(f"{file}: merged {number_of(again.size, 'row')} at the time of another")
     if not len(rows):
         raise fault(file, "", "found no samples, expected rows of numbers; record the motion anew")
-    exact = {k for k in leading if _is_set(columns[k])}
+    exact = {k for k in leading if is_set(columns[k].values, columns[k].half)}
     return {
         k: Column(c.head, c.values[rows], c.half[rows] * (k not in exact))
         for k, c in columns.items()
     }
-
-
-def _is_set(column: Column) -> bool:
-    """Return whether somebody set the values of time or a driver, so that they are not rounded: an
-    even grid, forth or back, or multiples of one number.
-    """
-    steps = np.abs(np.diff(column.values))
-    steps = steps[steps > 0.0]
-    if len(steps) >= FEWEST and are_even_steps(steps):
-        return True
-    known, half = column.values[np.isfinite(column.values)], column.half[column.half > 0.0]
-    decimals = round(-math.log10(2.0 * half.min())) if half.size else 0
-    return len(known) >= MANY and have_common_factor(known, decimals)
 
 
 def _require_equal(
@@ -236,18 +222,23 @@ def motion_of(
         first: those whose first sample is the design pose, if the frame is known by it.
     """
 
+    r_0, p_0 = body.origin, body.euler_parameters
+    if pose.frame:
+        e = np.array(pose.frame[3:])
+        r_0, p_0 = pose.frame[:3], tuple((e / np.linalg.norm(e)).tolist())
+
     def frame_pose(numbers: Mapping[str, Sequence[Array]]) -> tuple[Array, Array]:
-        return np.stack(numbers["position"], axis=-1), pose.reading.parameters(numbers["attitude"])
+        place = numbers["position"]
+        if len(place) == 2:  # a planar pose
+            place = [*place, np.full_like(place[0], r_0[2])]
+        r = np.stack(place, axis=-1)
+        return r, pose.reading.parameters(numbers["attitude"])
 
     r, p = frame_pose(given)
-    r_0, p_0 = body.origin, body.euler_parameters
     if pose.frame is None:
         r_all, p_all = frame_pose(first or given)
         k = int(np.argmax(np.isfinite(r_all).all(axis=1) & np.isfinite(p_all).all(axis=1)))
         r_0, p_0 = r_all[k].tolist(), p_all[k].tolist()
-    elif pose.frame:
-        e = np.array(pose.frame[3:])
-        r_0, p_0 = pose.frame[:3], tuple((e / np.linalg.norm(e)).tolist())
     back = quat(p_0).conjugate()
     frame = Placed.of(ZERO, quat(p.T))
     arm = frame.turn(Placed.of(ZERO, back).turn(vec(body.origin) - vec(r_0)))

@@ -168,8 +168,10 @@ def _drives(case: Case, samples: Samples) -> dict[str, Drive]:
             known = known if len(known) == 3 else known[:1]
             design = case.mechanism.design_value(driver.name)
             values = [known[0].values - design, *(each.values for each in known[1:])]
-            head = shown(known[0].head.name)
-            found[driver.name] = Drive(values, [c.half for c in known], f"is column {head}")
+            source = f"is column {shown(known[0].head.name)}"
+            if driver.turns and driver.name == case.sweep.driver:
+                source += _turns_off(known[0].values, case.sweep.values)
+            found[driver.name] = Drive(values, [c.half for c in known], source)
             continue
         jet = driver_motion(samples, case.mechanism, driver)
         if jet is None:
@@ -188,6 +190,14 @@ def _drives(case: Case, samples: Samples) -> dict[str, Drive]:
         if np.isfinite(orders[0]).all():
             found[driver.name] = Drive(orders, halves, "follows the recorded poses")
     return found
+
+
+def _turns_off(values: Array, swept: Array) -> str:
+    """Return words on a recorded angle that is off the sweep by whole turns; empty if it is not."""
+    off = float(np.median(values) - np.median(swept))
+    apart = values.min() > swept.max() or values.max() < swept.min()
+    turns = round(off / TURN)
+    return f", off by whole turns from the sweep, {turns:+d}" if apart and turns else ""
 
 
 def _orders(jet: Any) -> list[Array]:

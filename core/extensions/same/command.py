@@ -79,8 +79,8 @@ class Same(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...case.models.files import require_used
         from ...report.terminal import with_json
+        from ..trees.reader import require_used
         from .verdict import compare
 
         refuse(self.unwritable())
@@ -126,11 +126,11 @@ def _pair(text: str) -> tuple[str, str]:
 
 
 def _read(name: str, registry: Registry, without: Sequence[str]) -> Undriven:
-    from ...case.models.files import MODEL, kind_of
+    from ..trees.reader import is_model
     from .undriven import undriven_case, undriven_file
 
     file = Path(name)
-    if file.is_file() and kind_of(file) == MODEL:
+    if file.is_file() and is_model(file):
         return undriven_file(file, without)
     return undriven_case(registry.find_case(name, driven=False), name)
 

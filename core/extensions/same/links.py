@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import KincheckError, UnknownNameError
 from ...mechanism.mechanism import GROUND
+from ..trees.tree import COPY
 from .undriven import Undriven, plain_name
 
 # Places and distances of one model are equal within this part of its size.
@@ -68,15 +69,20 @@ def match_links(a: Undriven, b: Undriven, given: Mapping[str, str]) -> Match:
 
 
 def _by_name(a: Undriven, b: Undriven, found: dict[str, str]) -> bool:
-    """Add partners of the same name; return whether there is one."""
+    """Add partners of one name, or with parts of one name; return whether there is one."""
     before = len(found)
-    for same in (str, plain_name):
-        left = [[*a.links], [*b.links]]
-        left[0] = [x for x in left[0] if x not in found]
-        left[1] = [y for y in left[1] if y not in found.values()]
-        for x in left[0]:
-            fits = [y for y in left[1] if same(x) == same(y)]
-            if len(fits) == 1 and sum(same(x) == same(z) for z in left[0]) == 1:
+    for same, parts in ((str, 1), (plain_name, 1), (str, None), (plain_name, None)):
+        first, second = (
+            {
+                x: {same(part) for part in file.parts.get(x, (x,))[:parts] if COPY not in part}
+                for x in file.links
+                if x not in done
+            }
+            for file, done in ((a, {*found}), (b, {*found.values()}))
+        )
+        for x, names in first.items():
+            fits = [y for y, others in second.items() if names & others]
+            if len(fits) == 1 and sum(bool(second[fits[0]] & each) for each in first.values()) == 1:
                 found[x] = fits[0]
     return len(found) > before
 

@@ -1,28 +1,35 @@
-"""Facts beside motion that one file lacks or has otherwise: limits, motors, senses and zeros of
-coordinates, masses, gravity.
+"""Facts beside motion that one file lacks or has otherwise: limits, motors, springs, friction,
+senses and zeros of coordinates, masses, gravity.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
-from ...algebra import triple, vec
-from ...joints import Fixed
+from ...joints import Joint
 from ...mechanism.body import Body, inertia_matrix
-from ...mechanism.mechanism import GROUND
 from ...trajectory import Array
 from ..free.free_poses import Poses
-from ..trees.tree import Mass, sum_of_masses
+from ..trees.laws import EFFORT, REFERENCE, SPEED, Laws
 from .links import Match
-from .motion import SIDES, Placement, joints_of_both, measurable, rotate_vectors, times, values
+from .motion import (
+    SIDES,
+    Placement,
+    joints_by_links,
+    joints_of_both,
+    measurable,
+    rotate_vectors,
+    times,
+    values,
+)
+from .springs import PRINTED, between_links, equal, lost_in
 from .undriven import Coordinate, Undriven
 
-# Numbers that files print in fewest digits are equal within this part [-].
-PRINTED = 1e-5
 # A coordinate that moves less tells neither sense nor zero [rad or m].
 MOVES = 1e-3
 # Of gravity: 9.8, 9.80665 and 9.81 are one.
@@ -43,13 +50,13 @@ def lost_items(
         poses: of the first file, and the same as those of the second one.
         enough: lengths [m] and angles [rad] are equal within this.
     """
-    lost: dict[str, list[str]] = {}
+    lost: dict[tuple[int, str], list[str]] = {}
     changed: list[str] = []
-    for joint, other in joints_of_both(a, b, match):
+    pairs = joints_of_both(a, b, match)
+    for joint, other in pairs:
         first, second = a.coordinates.get(joint.name), b.coordinates.get(other.name)
-        if first is None or second is None:
-            continue
-        if measurable(a, joint.name) and measurable(b, other.name):
+        own, theirs = a.laws.get(joint.name, {}), b.laws.get(other.name, {})
+        if first and second and measurable(a, joint.name) and measurable(b, other.name):
             x = values(a, joint.name, first, poses[0])
             y = values(b, other.name, second, poses[1])
             sense, zero = _relation(x, y, turns=first.turns)
@@ -58,17 +65,21 @@ def lost_items(
             if abs(zero) > enough + PRINTED:
                 unit = "rad" if first.turns else "m"
                 changed.append(f"zero of {joint.name}: moved by {zero:.4g} {unit} in {b.name}")
-            second = _in_terms_of(second, sense, zero)
+            second, theirs = _in_terms_of(second, theirs, sense, zero)
         if not (a.is_model and b.is_model):
             continue
-        for what, where, text in _of_joint(first, second):
+        turns = first is None or first.turns
+        for what, where, text in _differences(_facts(first, own), _facts(second, theirs), turns):
             if text:
                 changed.append(f"{what} of {joint.name}: {text}")
             else:
-                file = (a, b)[where].name
-                lost.setdefault(f"lost in {file}: {what} of", []).append(joint.name)
+                lost.setdefault((where, what), []).append(joint.name)
+    if a.is_model and b.is_model:
+        for where, what, name in _alone(a, b, match, pairs):
+            lost.setdefault((where, what), []).append(name)
+        changed += between_links(a, b, match, place, poses[1], enough)
     return [
-        *(f"{what} {', '.join(names)}" for what, names in lost.items()),
+        *(lost_in((a, b)[k], what, names) for (k, what), names in lost.items()),
         *changed,
         *_masses(a, b, match, place, enough),
         *_gravity(a, b, place),
@@ -89,38 +100,76 @@ def _relation(x: Array, y: Array, *, turns: bool) -> tuple[float, float]:
     return sense, math.remainder(zero, 2.0 * math.pi) if turns else zero
 
 
-def _in_terms_of(coordinate: Coordinate, sense: float, zero: float) -> Coordinate:
-    """Return a coordinate y = sense x + zero with its limits as those of x."""
+def _in_terms_of(
+    coordinate: Coordinate, laws: Laws, sense: float, zero: float
+) -> tuple[Coordinate, Laws]:
+    """Return a coordinate y = sense x + zero with its limits, and its laws, as those of x."""
     given = coordinate.limit
     bounds = sorted((sense * (given.lower - zero), sense * (given.upper - zero)))
     limit = replace(given, lower=bounds[0], upper=bounds[1])
-    return replace(coordinate, limit=limit)
+    if REFERENCE in laws:
+        laws = {**laws, REFERENCE: sense * (laws[REFERENCE] - zero)}
+    return replace(coordinate, limit=limit), laws
 
 
-def _of_joint(a: Coordinate, b: Coordinate) -> Iterator[tuple[str, int, str]]:
-    """Yield differences of a joint: the fact, the file without it, and both values if both have
-    one.
-    """
-    for what, x, y in (
-        ("limits", (a.limit.lower, a.limit.upper), (b.limit.lower, b.limit.upper)),
-        ("effort limit", (a.limit.effort,), (b.limit.effort,)),
-        ("velocity limit", (a.limit.velocity,), (b.limit.velocity,)),
-    ):
-        if all(
-            p == q or abs(p - q) <= PRINTED * max(1.0, abs(p)) for p, q in zip(x, y, strict=True)
-        ):
+Facts: TypeAlias = Mapping[str, tuple[float, ...]]
+"""Numbers of a joint by what they are; a motor has none."""
+
+
+def _facts(coordinate: Coordinate | None, laws: Laws) -> Facts:
+    found: dict[str, tuple[float, ...]] = {}
+    if coordinate is not None:
+        limit = coordinate.limit
+        found = {
+            "limits": (limit.lower, limit.upper),
+            EFFORT: (limit.effort,),
+            SPEED: (limit.velocity,),
+        }
+        found = {what: each for what, each in found.items() if any(map(math.isfinite, each))}
+        found |= {"motor": ()} if coordinate.actuated else {}
+    return found | {law: (number,) for law, number in laws.items()}
+
+
+def _differences(a: Facts, b: Facts, turns: bool) -> Iterator[tuple[str, int, str]]:
+    """Yield different facts: which, the file without it, and both values if both have one."""
+    for what in dict.fromkeys((*a, *b)):
+        if what not in a or what not in b:
+            yield what, int(what in a), ""
             continue
-        free = [not any(map(math.isfinite, each)) for each in (x, y)]
+        x, y = a[what], b[what]
+        if all(map(equal, x, y)):
+            continue
         first, second = (" to ".join(f"{n:.6g}" for n in each) for each in (x, y))
         ratios = {abs(q / p) for p, q in zip(x, y, strict=True) if p and math.isfinite(q / p)}
         degrees = any(
             abs(r / math.degrees(1.0) - 1.0) < PRINTED or abs(r * math.degrees(1.0) - 1.0) < PRINTED
             for r in ratios
         )
-        why = ", as between degrees and radians" * (degrees and a.turns)
-        yield what, int(free[1]), "" if any(free) else f"{first} against {second}{why}"
-    if a.actuated != b.actuated:
-        yield "motor", int(a.actuated), ""
+        why = ", as between degrees and radians" * (degrees and turns)
+        yield what, 0, f"{first} against {second}{why}"
+
+
+def _alone(
+    a: Undriven, b: Undriven, match: Match, pairs: Sequence[tuple[Joint, Joint]]
+) -> Iterator[tuple[int, str, str]]:
+    """Yield facts of joints that have no partner in the other file, as of a loop that is closed by
+    points: the file without them, the fact, and the joint.
+    """
+    for k, (file, other, partner) in enumerate(
+        ((a, b, match.partner), (b, a, match.reversed.partner))
+    ):
+        paired = {pair[k].name for pair in pairs}
+        theirs = joints_by_links(other, {y: y for y in partner.values()})
+        for links, joints in joints_by_links(file, partner).items():
+            told = any(_facts_of(other, each) for each in theirs.get(links, ()))
+            for joint in joints:
+                if "" not in links and joint.name not in paired and not told:
+                    for what in _facts_of(file, joint):
+                        yield 1 - k, what, joint.name
+
+
+def _facts_of(file: Undriven, joint: Joint) -> Facts:
+    return _facts(file.coordinates.get(joint.name), file.laws.get(joint.name, {}))
 
 
 def _masses(
@@ -129,7 +178,7 @@ def _masses(
     """Yield the links whose masses differ."""
     lost: dict[str, list[str]] = {}
     for x, y in match.partner.items():
-        body, other = _whole(a, x, match.partner), _whole(b, y, match.partner.values())
+        body, other = a.mechanism.body(x), b.mechanism.body(y)
         if not body.mass or not other.mass:
             if body.mass != other.mass:
                 lost.setdefault((a, b)[bool(body.mass)].name, []).append(x)
@@ -147,25 +196,6 @@ def _masses(
             yield f"inertia of {x}: {off:.2g} kg m^2 apart"
     for file, names in lost.items():
         yield f"lost in {file}: masses of {', '.join(names)}"
-
-
-def _whole(file: Undriven, link: str, matched: Collection[str]) -> Body:
-    """Return a link with the masses of others that are fixed to it, and are links of no other file:
-    some models close a loop between two halves of a body.
-    """
-    mechanism, found = file.mechanism, [file.mechanism.body(link)]
-    for joint in mechanism.joints:
-        for one, other in (joint.bodies, joint.bodies[::-1]):
-            if isinstance(joint, Fixed) and one == link and other not in (GROUND, *matched):
-                found.append(mechanism.body(other))
-    if len(found) == 1 or not all(body.mass for body in found):
-        return found[0]
-    whole = sum_of_masses(
-        [Mass(body.mass, vec(body.center_of_mass or body.origin), _inertia(body)) for body in found]
-    )
-    xx, yy, zz, xy, xz, yz = whole.inertia[np.triu_indices(3)][[0, 3, 5, 1, 2, 4]].tolist()
-    six = (xx, yy, zz, xy, yz, xz)
-    return replace(found[0], mass=whole.mass, center_of_mass=triple(whole.center), inertia=six)
 
 
 def _arm(body: Body) -> float:

@@ -135,7 +135,7 @@ def _fit_pose(
 Links: TypeAlias = frozenset[str]
 
 
-def _by_links(file: Undriven, partner: Mapping[str, str]) -> dict[Links, list[Joint]]:
+def joints_by_links(file: Undriven, partner: Mapping[str, str]) -> dict[Links, list[Joint]]:
     """Return the joints of a file by the partners of their links; the ground is its own."""
     found: dict[Links, list[Joint]] = {}
     for joint in file.mechanism.joints:
@@ -148,20 +148,25 @@ def _by_links(file: Undriven, partner: Mapping[str, str]) -> dict[Links, list[Jo
 
 
 def joints_of_both(a: Undriven, b: Undriven, match: Match) -> list[tuple[Joint, Joint]]:
-    """Return joints of the same freedoms between partners, the only ones between them."""
-    second = _by_links(b, {y: y for y in match.partner.values()})
-    return [
-        (joints[0], second[links][0])
-        for links, joints in _by_links(a, match.partner).items()
-        if "" not in links
-        and len(joints) == len(second.get(links, ())) == 1
-        and joints[0].freedoms == second[links][0].freedoms
-    ]
+    """Return joints of the same freedoms between partners: those of one name, or the only ones
+    between them.
+    """
+    second = joints_by_links(b, {y: y for y in match.partner.values()})
+    found: list[tuple[Joint, Joint]] = []
+    for links, joints in joints_by_links(a, match.partner).items():
+        others = second.get(links, [])
+        if "" in links:
+            continue
+        for joint in joints:
+            named = [each for each in others if each.name == joint.name]
+            alone = others if len(joints) == len(others) == 1 else []
+            found += [(joint, k) for k in (named or alone) if k.freedoms == joint.freedoms]
+    return found
 
 
 def tied_links(file: Undriven, partner: Mapping[str, str]) -> dict[Links, str]:
     """Return joints, and couplings by the links of both joints, by the partners of their links."""
-    found = {links: joints[0].name for links, joints in _by_links(file, partner).items()}
+    found = {links: joints[0].name for links, joints in joints_by_links(file, partner).items()}
     for each in file.mechanism.couplers:
         links = {name for joint in each.joints for name in file.mechanism.joint(joint).bodies}
         names = {GROUND if file.mechanism.is_fixed(x) else partner.get(x, "") for x in links}

@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...case.case import Case
-from ...case.models.files import MODEL, kind_of, load, read_tree, root_of
+from ...case.io.element import Element, printed_digits
+from ...case.models.files import load
 from ...joints import Revolute, Translational
+from ...kinematics import reduce_rows
 from ...mechanism.mechanism import Mechanism
 from ..trees.case import undriven_mechanism
-from ..trees.element import Element, printed_digits
-from ..trees.tree import NO_LIMIT, Limit
+from ..trees.gluing import glue
+from ..trees.laws import Laws, laws_of, tendons_of
+from ..trees.reader import is_model, read_tree, root_of
+from ..trees.tree import NO_LIMIT, Limit, Strut
 
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
 _PARTS = 12
@@ -54,6 +58,11 @@ class Undriven:
         angle_error: error of angles in few digits [rad].
         is_model: whether the file is a model, with limits, motors and frames of links.
         says_gravity: whether the file can say it.
+        parts: names of the bodies of the file that are one, by the name of the whole.
+        root: tag of the first element of a model, which tells its format.
+        laws: numbers of joints beside motion; see `laws_of`.
+        struts: springs and bushings between links.
+        tendons: what is said of the forces and limits of tendons.
         notes: of its reader.
         without: names by which the user leaves out elements of the file.
     """
@@ -67,6 +76,11 @@ class Undriven:
     angle_error: float = 0.0
     is_model: bool = False
     says_gravity: bool = True
+    parts: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
+    root: str = ""
+    laws: Mapping[str, Laws] = field(default_factory=dict[str, Laws])
+    struts: Sequence[Strut] = ()
+    tendons: Mapping[str, Mapping[str, str]] = field(default_factory=dict[str, Mapping[str, str]])
     notes: Sequence[str] = ()
     without: Collection[str] = ()
 
@@ -91,13 +105,18 @@ class Undriven:
 
 def undriven_case(case: Case, name: str) -> Undriven:
     """Return a case without its drivers."""
-    mechanism = replace(case.mechanism, drivers=(), forces=())
+    given = replace(case.mechanism, joints=case.mechanism.given_joints, reduced=())
+    mechanism, parts = glue(given, ())
+    if case.closure is not None:
+        closure = case.closure
+        mechanism = reduce_rows(mechanism, closure.tolerance, closure.carrying).mechanism
     coordinates = {
         joint.name: Coordinate(isinstance(joint, Revolute))
         for joint in mechanism.joints
         if isinstance(joint, Revolute | Translational)
     }
-    return Undriven(name, mechanism, coordinates, [body.name for body in mechanism.moving])
+    links = [body.name for body in mechanism.moving]
+    return Undriven(name, mechanism, coordinates, links, parts=parts)
 
 
 def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
@@ -109,10 +128,10 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
     Raises:
         CaseError: it cannot be read.
     """
-    if kind_of(file) != MODEL:
+    if not is_model(file):
         return undriven_case(load(file), file.name)
     root = root_of(file)
-    mechanism, tree, spinning = undriven_mechanism(read_tree(file, without))
+    mechanism, tree, spinning, parts = undriven_mechanism(read_tree(file, without))
     coordinates = {
         name: Coordinate(move.kind == "hinge", move.value, move.limit, name in tree.actuated)
         for name, move in tree.joints.items()
@@ -121,7 +140,7 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
     digits = printed_digits(root)
     return Undriven(
         file.name,
-        replace(mechanism, drivers=(), forces=()),
+        mechanism,
         coordinates,
         [body.name for body in mechanism.moving if body.name in tree.places],
         spinning,
@@ -130,6 +149,11 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
         is_model=True,
         says_gravity=root.tag == "mujoco"
         or any(each.tag in _SCENES for each in root.descendants()),
+        parts=parts,
+        root=root.tag,
+        laws=laws_of(tree, root),
+        struts=tree.struts,
+        tendons=tendons_of(tree),
         notes=[f"{file.name}: {note}" for note in tree.notes],
         without=tree.without,
     )

@@ -14,7 +14,7 @@ from ...case.io.reader_options import Supplied
 from ...cli import shared_options
 from ...cli.parser import Command
 from ...cli.registry import Registry, Status
-from ...cli.shared_options import SCHEDULER, TOL
+from ...cli.shared_options import TOL
 from ...errors import KincheckError, refuse, unknown
 from ...harness.interrupts import hold, status_of, words_of
 from ...options import (
@@ -33,6 +33,7 @@ from ...options import (
 )
 from ...report.progress import complain, explain_no_comparison, missing_requirements
 from ...version import VERSION
+from ..cluster.source import SCHEDULER
 from .study_choices import Incomplete, Sampling
 
 if TYPE_CHECKING:
@@ -275,7 +276,7 @@ def _part(options: Sweep, folder: Path) -> Part:
 
     from ...cli.joint_loading import sources
     from ...harness.provenance import processor
-    from ...program.llvm.compiler import available
+    from ...program.llvm.machine_code import available
     from .chunk_files import Part
 
     facts: dict[str, Any] = {

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ...case.io.table_file import csv_text
-from ...errors import number_of
+from ...errors import labelled, number_of
 from ...harness.labels import notes, number
 from ...report import terminal
 from ...report.table import print_signs
@@ -176,7 +176,7 @@ def scaled_number(scale: float, value: float | None) -> str:
 
 def remarks(results: SweepResults) -> list[str]:
     """Return remarks on the numbers, a line each."""
-    lines = [f"note: {note}" for _, note in notes(results.run)]
+    lines = [labelled(note) for _, note in notes(results.run)]
     lines += [
         f"unsolved: variant {each.variant}, {each.samples} samples: {each.message}"
         for each in results.failed[:10]

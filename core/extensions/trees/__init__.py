@@ -1,5 +1,5 @@
-"""Models of links in files of other programs: MJCF, URDF, SDF, USD and OpenSim, read into
-one tree of links.
+"""Models of links in files of other programs: MJCF, URDF and SDF, read into one tree of
+links.
 
 A reader of another format fills a `Tree`, outer links first, or a `Graph` of links and joints in
 any order, which is hung up as a tree. `case.case_of` makes the case of a tree. Messages name an
@@ -8,4 +8,6 @@ any order, which is hung up as a tree. `case.case_of` makes the case of a tree. 
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__)
+EXTENSION = Extension(
+    __name__, readers={"mjcf": "reader:MJCF", "urdf": "reader:URDF", "sdf": "reader:SDF"}
+)

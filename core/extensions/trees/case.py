@@ -5,25 +5,26 @@ others held.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ...algebra import Vec3, X, Y, cross, vec
+from ...algebra import X, Y, vec
 from ...case.case import Case, Sweep, Truth
 from ...case.closing import within_digits
 from ...case.io.document import SMALLEST, explained, usable
+from ...case.io.element import Names
 from ...case.io.outputs import with_all_motions
-from ...case.io.reader_options import LEFT_OUT, Supplied
-from ...errors import MechanismError, shortened
+from ...case.io.readers import LEFT_OUT
+from ...errors import WARNING, CaseError, MechanismError, shortened
 from ...joints import (
     Coupler,
     Distance,
     Fixed,
     Joint,
-    PerpendicularAxes,
     Polynomial,
     Revolute,
     Spherical,
@@ -31,16 +32,15 @@ from ...joints import (
     Translational,
     linear_relation,
 )
-from ...joints.base import triad
 from ...kinematics import degrees_of_freedom, reduce_rows
 from ...mechanism.body import Body, Inertia, checked_inertia
 from ...mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism, Point
 from ...mechanism.motions import Absolute, Driver, JointAngle, JointDisplacement, Motion, Table
-from ...trajectory import Array
 from .assembly import Assembled, assemble
 from .driving import (
     KEYFRAME,
+    MOST_HELD,
     Driving,
     UndrivenMotions,
     choose_held,
@@ -48,8 +48,10 @@ from .driving import (
     read_driving,
     read_start,
 )
-from .element import Names
+from .gluing import glue
+from .options import ModelOptions
 from .place import Place, coordinates, rotation_vector
+from .spins import Spin, find_spins
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, sum_of_masses
 
 FREEDOMS = {"hinge": "rotation", "slide": "translation"}
@@ -64,7 +66,7 @@ PARALLEL = 1e-9
 BEHIND = 100.0
 
 
-def case_of(tree: Tree, supplied: Supplied) -> Case:
+def case_of(tree: Tree, supplied: ModelOptions) -> Case:
     """Return the case of a tree; outputs are the coordinates of the origins of links and of sites,
     those of joints, and the rotations of links.
 
@@ -75,22 +77,25 @@ def case_of(tree: Tree, supplied: Supplied) -> Case:
     return _Parts(*model_of(tree, supplied)).case()
 
 
-def undriven_mechanism(tree: Tree) -> tuple[Mechanism, Tree, set[str]]:
-    """Return the mechanism of a tree without drivers, the tree in its closed start, and its links
-    with a free turn about themselves.
+def undriven_mechanism(
+    tree: Tree,
+) -> tuple[Mechanism, Tree, set[str], Mapping[str, Sequence[str]]]:
+    """Return the mechanism of a tree without drivers, its loops closed and its halves glued, the
+    tree in its closed start, its links with a free turn about themselves, and the names of the
+    parts of each link.
 
     Raises:
         CaseError: its start does not close, or there is no joint for one of its ties.
     """
     model = assemble(read_start(tree, ()), None)
     spins = find_spins(model.tree, ())
-    whole = _Parts(model, Driving({}, (), ()), spins).mechanism()
+    whole, parts = glue(_Parts(model, Driving({}, (), ()), spins).mechanism(), tree.places)
     if not model.is_exact:
         whole = reduce_rows(whole, model.closing.tolerance, [*tree.joints]).mechanism
-    return whole, model.tree, {spin.move.inner for spin in spins.values()}
+    return whole, model.tree, {spin.move.inner for spin in spins.values()}, parts
 
 
-def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
+def model_of(tree: Tree, supplied: ModelOptions) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
     """Return a tree in its closed start, its driven and held moves, and its links that spin.
 
     Raises:
@@ -108,12 +113,40 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
             driving, used = own, used + tree.motors
             model = replace(model, notes=(*model.notes, note))
     model = replace(model, tree=replace(model.tree, left_out=tree.left_out - used))
-    chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)
+    chosen, spins = _choose_held(model, driving, spins, hold_rest=supplied.hold_rest)
     rest = [name for name in chosen.held + chosen.fixed if name not in supplied.hold]
     if passive := [name for name in rest if name not in model.tree.actuated]:
-        note = f"held by --hold-rest, without a motor: {shortened(passive, MOST_NAMED)}"
+        note = (
+            f"{WARNING}held by --hold-rest, without a motor:"
+            f" {shortened(passive, MOST_NAMED)}; a loop that the file lacks would move them"
+        )
         model = replace(model, notes=(*model.notes, note))
     return model, chosen, spins
+
+
+def _choose_held(
+    model: Assembled, driving: Driving, spins: Mapping[str, Spin], *, hold_rest: bool
+) -> tuple[Driving, Mapping[str, Spin]]:
+    """Return the driven and held moves, and the links with a spin beside them.
+
+    A link between two balls is a rod, whose spin is no freedom. If --hold-rest cannot hold the rest
+    so, it holds the ball of such a link too, which is then no rod.
+
+    Raises:
+        CaseError: see `choose_held`.
+    """
+    axes = {name: spin.axis for name, spin in spins.items()}
+    try:
+        return choose_held(model, driving, axes, hold_rest=hold_rest), spins
+    except CaseError:
+        balls = [name for name, spin in spins.items() if spin.move.kind == "ball"]
+        if not (hold_rest and 0 < len(balls) <= MOST_HELD):
+            raise
+        tried = replace(driving, fixed=(*driving.fixed, balls[0]))
+        with suppress(CaseError):
+            left = find_spins(model.tree, tried.fixed)
+            return _choose_held(model, tried, left, hold_rest=True)
+        raise
 
 
 class _Parts:
@@ -343,6 +376,13 @@ class _Parts:
             try:
                 if len({*strut.links} & {GROUND, *self.bodies}) < 2:
                     raise MechanismError("it joins no two bodies of the mechanism")
+                if turned := _turn_of_bushing(strut):
+                    self.tree.notes.append(
+                        f"{strut.element} is left out of the forces: its frames are turned against"
+                        f" each other by {turned:.3g} rad in the start, and there is no preload of"
+                        " its torques"
+                    )
+                    raise MechanismError("it has a preload of torques")
                 yield _force_element(strut, names.new(strut.name))
             except MechanismError:
                 self.tree.count(strut.described)
@@ -384,27 +424,25 @@ class _Parts:
 
 
 def _force_element(strut: Strut, name: str) -> ForceElement:
-    """Return the force element between two links.
-
-    Raises:
-        CaseError: the frames of a bushing that resists turns are not parallel.
-    """
+    """Return the force element between two links."""
     law, (first, second) = strut.spring, strut.places
     p, q = coordinates(first.at), coordinates(second.at)
     if isinstance(law, Spring):
         stiffness = law.stiffness, law.damping
         return SpringDamper(name, *strut.links, (p, q), *stiffness, free_length=law.rest)
     apart = second.relative_to(first)
-    turned = float(np.linalg.norm([*rotation_vector(apart.turn)]))
-    if turned > PARALLEL and any((*law.turning_stiffness, *law.turning_damping)):
-        raise strut.element.fault(
-            f"its frames are turned against each other by {turned:.3g} rad in the start, expected"
-            " parallel ones; there is no preload of its torques: turn one of them, or leave it out"
-            f" by --without {strut.element.tag}"
-        )
     x, y = (coordinates(first.direction(axis)) for axis in (X, Y))
     preload = coordinates(vec([k * r for k, r in zip(law.stiffness, apart.at, strict=True)]))
     return Bushing(name, *strut.links, q, (x, y), **vars(law), preload=preload)
+
+
+def _turn_of_bushing(strut: Strut) -> float:
+    """Return the angle between the frames of a bushing with a torque [rad]; zero of others."""
+    law, (first, second) = strut.spring, strut.places
+    if isinstance(law, Spring) or not any((*law.turning_stiffness, *law.turning_damping)):
+        return 0.0
+    turned = float(np.linalg.norm([*rotation_vector(second.relative_to(first).turn)]))
+    return turned if turned > PARALLEL else 0.0
 
 
 def _locked_moves(tree: Tree) -> set[str]:
@@ -458,130 +496,3 @@ def _with_mass(body: Body, mass: Mass) -> Body | None:
     except MechanismError:
         return None
     return replace(body, mass=mass.mass, center_of_mass=center, inertia=inertia)
-
-
-# Points at a distance from the line through two others, over the distance of these, that rounding
-# of composed frames leaves.
-ON_LINE = 1e-9
-
-
-@dataclass(frozen=True)
-class End:
-    """A point of a link held there, but free to turn.
-
-    Attributes:
-        other: link it is held by.
-        by: the move or closure.
-    """
-
-    point: Vec3
-    other: str
-    by: Move | Closure
-
-    @property
-    def slides(self) -> bool:
-        """Whether it is held at a distance only."""
-        return isinstance(self.by, Closure) and self.by.holds == "distance"
-
-
-@dataclass(frozen=True)
-class Spin:
-    """A link with a free turn about a line.
-
-    Attributes:
-        move: its ball or free move.
-        ends: its held points, two of them apart.
-        is_rod: whether it can be left out for a distance between the links at its ends.
-    """
-
-    move: Move
-    ends: Sequence[End]
-    is_rod: bool
-
-    @property
-    def arm(self) -> Vec3:
-        """From the first end to the one farthest from it [m]."""
-        return _longest(self.ends)
-
-    @property
-    def axis(self) -> Array:
-        """The line's direction, shape (3,)."""
-        a = np.array([*self.arm], dtype=np.float64)
-        return a / np.linalg.norm(a)
-
-    def lock(self, name: str) -> PerpendicularAxes:
-        """Return a joint against the turn about the line, with the link of the first end."""
-        f, g, _ = triad(coordinates(self.arm))
-        axes = coordinates(f), coordinates(g)
-        return PerpendicularAxes(name, self.ends[0].other, self.move.inner, axes)
-
-
-def find_spins(tree: Tree, fixed: Collection[str]) -> Mapping[str, Spin]:
-    """Return the links free to turn about a line, by their moves' names.
-
-    Args:
-        fixed: held moves and links.
-    """
-    ends = _ends(tree)
-    found: dict[str, Spin] = {}
-    rods: set[str] = set()
-    for move in tree.moves.values():
-        held = ends[move.inner]
-        if (
-            move.is_axial
-            or move.inner in tree.massless
-            or {move.name, move.inner} & {*fixed}
-            or held is None
-            or not _on_line(held)
-        ):
-            continue
-        others = {each.other for each in held}
-        # a rod to the link it hangs on moves nothing, and two of them end to end are a chain that
-        # only links can carry
-        is_rod = (
-            len(held) == len(others) == 2
-            and not any(each.slides for each in held)
-            and not others & rods
-        )
-        if is_rod:
-            rods.add(move.inner)
-        found[move.name] = Spin(move, held, is_rod)
-    return found
-
-
-def _ends(tree: Tree) -> dict[str, list[End] | None]:
-    """Return the held points of each link; None if something keeps it from turning."""
-    found: dict[str, list[End] | None] = {name: [] for name in tree.moving}
-
-    def hold(link: str, end: End | None) -> None:
-        known = found.get(link)
-        if end is None and link in found:
-            found[link] = None
-        elif end is not None and known is not None:
-            known.append(end)
-
-    for move in tree.moves.values():
-        if move.kind != "free":
-            for link, other in ((move.outer, move.inner), (move.inner, move.outer)):
-                hold(link, None if move.is_axial else End(move.point, other, move))
-    for each in tree.ties:
-        if isinstance(each, Coupling):
-            continue
-        pairs = zip(each.links, reversed(each.links), each.places, strict=True)
-        for link, other, place in pairs:
-            hold(link, None if each.holds == "frame" else End(place.at, other, each))
-    return found
-
-
-def _longest(ends: Sequence[End]) -> Vec3:
-    return max((each.point - ends[0].point for each in ends), key=lambda a: a @ a)
-
-
-def _on_line(ends: Sequence[End]) -> bool:
-    """Return whether points are on one line, two of them apart, and one is held in place."""
-    if len(ends) < 2 or all(each.slides for each in ends):
-        return False
-    longest = _longest(ends)
-    size = longest @ longest
-    off = [cross(longest, each.point - ends[0].point) for each in ends]
-    return size > 0.0 and all(a @ a <= (ON_LINE * size) ** 2 for a in off)

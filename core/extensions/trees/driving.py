@@ -15,13 +15,13 @@ import numpy as np
 
 from ...algebra import quat, vec
 from ...case.io.document import decimal, interval, measure, shown, unknown_name, usable
-from ...case.io.reader_options import Supplied
+from ...case.io.element import Element
 from ...case.io.schema import MOST_SAMPLES
 from ...case.units import ANGLES, LENGTHS
 from ...errors import MOST_NAMED, CaseError, remedy, shortened, with_article
 from ...trajectory import Array
 from .assembly import AT_REST, Assembled, Pose, Start, Value
-from .element import Element
+from .options import ModelOptions
 from .place import Place, unit_quaternion
 from .tree import UNKNOWNS, Move, Tree
 
@@ -167,7 +167,7 @@ class Driving:
         return [f"joints beyond their limits: {told}"] if found else []
 
 
-def read_driving(tree: Tree, supplied: Supplied) -> Driving:
+def read_driving(tree: Tree, supplied: ModelOptions) -> Driving:
     """Read --drive and --hold.
 
     Raises:
@@ -254,7 +254,7 @@ def _read_drive(tree: Tree, text: str) -> tuple[str, Array, int | None]:
     return name, np.linspace(start, stop, count), samples
 
 
-def driving_of_motors(tree: Tree, supplied: Supplied) -> tuple[Driving, str]:
+def driving_of_motors(tree: Tree, supplied: ModelOptions) -> tuple[Driving, str]:
     """Return the driving of all joints with a motor through their limits, none without limits, and
     a note on it.
     """
@@ -371,13 +371,20 @@ def choose_held(
 
 
 def _candidates(tree: Tree, driving: Driving) -> list[Move]:
-    """Return the moves to hold, the first ones first."""
-    named = {*driving.moves, *driving.fixed}
+    """Return the moves to hold, the first ones first.
 
-    def order(move: Move) -> int:
+    Joints without a motor come in the order of the file. If files beside a robot or names of its
+    frames close it, those nearer to the base come first: most such robots have their motors there.
+    """
+    named = {*driving.moves, *driving.fixed}
+    depths: dict[str, int] = {}
+    for move in tree.moves.values():  # outer ones first
+        depths[move.inner] = 0 if tree.closes else 1 + depths.get(move.outer, 0)
+
+    def order(move: Move) -> tuple[int, int]:
         if move.is_axial:
-            return 1 if move.name in tree.actuated else 2
-        return 0 if move.kind == "free" else 3
+            return (1, 0) if move.name in tree.actuated else (2, depths[move.inner])
+        return (0, 0) if move.kind == "free" else (3, 0)
 
     loose = [move for move in tree.moves.values() if not {move.name, move.inner} & named]
     return sorted(loose, key=order)

@@ -12,6 +12,7 @@ frames that may have a gap.
 from __future__ import annotations
 
 import math
+import re
 from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,11 +20,14 @@ from typing import TypeAlias
 
 from ...algebra import IDENTITY, ZERO, Quat, Vec3, X
 from ...case.io.document import SMALLEST
+from ...case.io.element import Element, significant_digits
+from ...errors import WARNING
 from ...mechanism.mechanism import GROUND
-from .element import Element, significant_digits
 from .place import ORIGIN, Place, turn_about, unit_quaternion
-from .tree import NO_LIMIT, WORLD, Closure, Coupling, Kind, Limit, Mass, Move, Strut, Tree
+from .tree import COPY, NO_LIMIT, WORLD, Closure, Coupling, Kind, Limit, Mass, Move, Strut, Tree
 
+CLOSING = re.compile(r"(.*\bclosing_.+)_([12])")
+"""Names of the two ends of a loop."""
 FIXED = (WORLD, GROUND)
 """Names of a fixed link at the origin, which is the world."""
 
@@ -121,6 +125,42 @@ class Graph:
         self.places[name], self.elements[name] = ORIGIN, self.root
         self.fixed.add(name)
         return name
+
+    def close_named_pairs(self) -> None:
+        """Hold each two frames named closing_X_1 and closing_X_2 together at one point, as
+        onshape-to-robot (github.com/Rhoban/onshape-to-robot) names the ends of a loop.
+        """
+        ends: dict[str, dict[str, str]] = {}
+        for name in (*self.places, *self.frames):
+            if found := CLOSING.fullmatch(name):
+                ends.setdefault(found[1], {})[found[2]] = name
+        bodies = self._rigid_bodies()
+        closed = [{bodies[name] for name in loop.links} for loop in self.loops]
+        for each in ends.values():
+            if len(each) < 2:
+                (alone,) = each.values()
+                self.tree.notes.append(f"{WARNING}{alone} has no other end: that loop is open")
+                continue
+            names = each["1"], each["2"]
+            frames = [self.frames.get(name) or (name, self.places[name]) for name in names]
+            (a, first), (b, second) = frames
+            if bodies[a] == bodies[b] or {bodies[a], bodies[b]} in closed:
+                continue
+            ball: list[Freedom] = [("", "ball", X)]
+            element, at = self.elements[a], (Place(first.at), Place(second.at))
+            title = " = ".join(names)
+            self.loops.append(Joint.of(title, (a, b), first.at, ball, element, frames=at))
+            self.tree.closes = False
+            self.tree.notes.append(f"{names[0]} and {names[1]} are one point, as their names say")
+
+    def _rigid_bodies(self) -> dict[str, str]:
+        """Return by link the first of all links rigidly joined with it."""
+        found = {name: WORLD if name in self.fixed else name for name in self.places}
+        fixed = [joint.links for joint in self.joints if not joint.moves and not joint.is_free]
+        for a, b in fixed:
+            one, other = found[a], found[b]
+            found = {name: one if body == other else body for name, body in found.items()}
+        return found
 
     def hang(self) -> Tree:
         """Hang all links, and tie them; return the tree.
@@ -267,7 +307,7 @@ class _Hanging:
             moves = moves[:-1]
         if moves:
             closure = f"{joint.name}.closure"
-            copy = self.tree.names.new(f"{joint.name}.copy")
+            copy = self.tree.names.new(f"{joint.name}{COPY}")
             self._add(_Part(copy, outer, at, joint.element, moves))
             outer = copy
         if joint.frames:

@@ -1,11 +1,26 @@
 """Files beside a URDF, with its loops: NAME.constraints.json, as `kincheck export --to urdf` writes
-it, and NAME.yaml of example-parallel-robots (github.com/Gepetto/example-parallel-robots):
+it, and NAME.yaml or loop_closures.yaml, which have keys of three kinds.
+
+Of example-parallel-robots (github.com/Gepetto/example-parallel-robots):
 
 closed_loop: [[frame, frame], ...]     links of the URDF that coincide
 type: ["6d", "3d", ...]                all, or only the points
 name_mot: [joint, ...]                 joints with a motor
 joint_name: [joint, ...]               joints of another type than the URDF can say
 joint_type: [SPHERICAL, UJOINT_XY, FIXED, ...]
+
+Of scikit-robot (github.com/iory/scikit-robot) and converters of CAD with the same file, in the axes
+of the base in the zero pose:
+
+closures: [{link_a: link, link_b: link, point: [x, y, z], axis: [x, y, z]}, ...]
+independent: [joint, ...]              joints with a motor
+dependent: [joint, ...]                the others
+
+Of RoboNex (github.com/Humanoid-Project/robonex-description), in the axes of both links:
+
+ball_loops: [{name: ..., parent: link, child: link, parent_xyz: [...], child_xyz: [...]}, ...]
+pin_loops: the same with axis: [x, y, z]
+ball_upgrades: [joint, ...]            joints as balls
 
 All conditions of a joint in NAME.constraints.json together give its freedoms: `offset` leaves
 slides across its direction, and pairs of `directions` leave turns. The joint is a chain of slides
@@ -15,28 +30,35 @@ and turns from the zero pose, in which all conditions hold.
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 import msgspec
 
 from ...algebra import Vec3, X, Y, Z, cross, quat, vec
-from ...case.io.document import fault, parse, parse_yaml, read_text, shown, unknown_name, usable
-from ...errors import CaseError, remedy
+from ...case.io.document import fault, parse, read_text, shown, unknown_name, usable
+from ...case.io.element import Element, unit_vector
+from ...case.io.toml_text import parse_yaml
+from ...errors import WARNING, CaseError, remedy, shortened, similar
 from ...joints.base import triad
 from ...joints.polynomial import HIGHEST
 from ...mechanism.mechanism import Vector
-from .element import Element
 from .graph import Freedom, Graph, Joint
-from .place import Place, unit_quaternion, unit_vector
+from .place import ORIGIN, Place, unit_quaternion
 from .tree import Closure, Coupling, Kind, Move, Tree, require_spline
 
 CONSTRAINTS = ".constraints.json"
 YAML = (".yaml", ".yml")
 LARGEST_FILE = 4_000_000
+LOOPS = "loop_closures"
+# The folder of the URDF, and in a package of ROS that of the package, beside urdf/.
+_PLACES = ("", "config/", "../", "../config/")
+_CLOSES = re.compile(r"loop|clos|constrain|mimic|coupl|equal")
+MOST_NAMED = 8
 SCHEMA = "kincheck-constraints/1"
 RELATIONS = ("linear", "polynomial", "spline")
 # Rounding of exported numbers, relative to the size of the numbers.
@@ -93,14 +115,49 @@ class ConstraintsFile(msgspec.Struct, frozen=True):
     bodies: dict[str, BodyFrame] = {}
 
 
+class HingeOfBase(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A closing hinge, in the axes of the base; a ball without an axis."""
+
+    link_a: str
+    link_b: str
+    point: Vector
+    axis: Vector | None = None
+    name: str = ""
+
+
+class LoopOfLinks(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A point of each of two links, in its axes, and an axis in those of the first."""
+
+    parent: str
+    child: str
+    parent_xyz: Vector
+    child_xyz: Vector
+    axis: Vector | None = None
+    name: str = ""
+
+
 class PairsFile(msgspec.Struct, frozen=True):
-    """NAME.yaml; its other keys are for control programs."""
+    """NAME.yaml or loop_closures.yaml; its other keys are for control programs."""
 
     closed_loop: list[tuple[str, str]] = []
     type: list[str] = []
     name_mot: list[str] = []
     joint_name: list[str] = []
     joint_type: list[str] = []
+    closures: list[HingeOfBase] = []
+    independent: list[str] = []
+    dependent: list[str] = []
+    ball_loops: list[LoopOfLinks] = []
+    pin_loops: list[LoopOfLinks] = []
+    ball_upgrades: list[str] = []
+
+    @property
+    def links(self) -> set[str]:
+        """The links and frames it joins."""
+        found = {name for pair in self.closed_loop for name in pair}
+        found |= {name for each in self.closures for name in (each.link_a, each.link_b)}
+        rows = (*self.ball_loops, *self.pin_loops)
+        return found | {name for each in rows for name in (each.parent, each.child)}
 
 
 @dataclass(frozen=True)
@@ -110,16 +167,18 @@ class LoopFiles:
     Attributes:
         pairs: pairs of frames, which the zero pose need not bring together.
         types: types of joints in place of those of the URDF; letters for a universal joint.
+        notes: on unread files and keys.
     """
 
     constraints: tuple[Path, ConstraintsFile] | None = None
-    pairs: tuple[Path, PairsFile] | None = None
+    pairs: Sequence[tuple[Path, PairsFile]] = ()
     types: Mapping[str, str] = field(default_factory=dict[str, str])
+    notes: Sequence[str] = ()
 
     @property
     def names(self) -> list[str]:
         """Names of the files."""
-        return [each[0].name for each in (self.constraints, self.pairs) if each]
+        return [each[0].name for each in (self.constraints, *self.pairs) if each]
 
     def add(self, graph: Graph) -> None:
         """Add the loops to the links of a robot.
@@ -129,8 +188,9 @@ class LoopFiles:
         """
         if self.constraints is not None:
             _add_constraints(*self.constraints, graph)
-        if self.pairs is not None:
-            _add_pairs(*self.pairs, graph)
+        for pairs in self.pairs:
+            _add_pairs(*pairs, graph)
+        graph.tree.notes += self.notes
 
     def place(self, tree: Tree) -> None:
         """Give links the frames of the bodies they are written of, whose joints and numbers a URDF
@@ -169,20 +229,58 @@ def read_loop_files(root: Element) -> LoopFiles:
     own = file.with_suffix(CONSTRAINTS)
     if own.exists():
         constraints = own, _constraints(own)
-    paired = next((each for each in map(file.with_suffix, YAML) if each.exists()), None)
-    if paired is None:
-        return LoopFiles(constraints)
-    pairs = _pairs(paired)
-    for name, kind in zip(pairs.joint_name, pairs.joint_type, strict=True):
-        types[name] = _TYPES.get(kind, kind.removeprefix("UJOINT_"))
-        if all(each.attributes.get("name") != name for each in root.findall("joint")):
-            raise fault(
-                paired,
-                "joint_name",
-                f"found {name!r}, expected a joint of {file.name}; correct it, or remove it with"
-                " its joint_type",
-            )
-    return LoopFiles(constraints, (paired, pairs), types)
+    joints = {each.attributes.get("name", "") for each in root.findall("joint")}
+    frames = joints | {each.attributes.get("name", "") for each in root.findall("link")}
+    found: list[tuple[Path, PairsFile]] = []
+    notes: list[str] = []
+    for paired in _paired(file):
+        pairs, unread = _pairs(paired)
+        if pairs.links and not pairs.links & frames:
+            notes.append(f"{paired.name} beside it is of other links, and not read")
+            continue
+        if unread:
+            notes.append(f"{paired.name}: not read: {shortened(unread, MOST_NAMED)}")
+        for key, name in [
+            *(("joint_name", name) for name in pairs.joint_name),
+            *(("ball_upgrades", name) for name in pairs.ball_upgrades),
+            *(("independent", name) for name in pairs.independent),
+            *(("dependent", name) for name in pairs.dependent),
+            *(("name_mot", name) for name in pairs.name_mot),
+        ]:
+            if name not in joints:
+                raise unknown_name(paired, key, name, joints, f"a joint of {file.name}")
+        for name, kind in zip(pairs.joint_name, pairs.joint_type, strict=True):
+            types[name] = _TYPES.get(kind, kind.removeprefix("UJOINT_"))
+        types |= dict.fromkeys(pairs.ball_upgrades, "spherical")
+        found.append((paired, pairs))
+    read = {own, *(each for each, _ in found)}
+    notes += [
+        f"{WARNING}{each} beside it may close loops, and is not read; write them as <constraint>"
+        for each in _others(file)
+        if file.parent / each not in read
+    ]
+    return LoopFiles(constraints, found, types, notes)
+
+
+def _paired(file: Path) -> list[Path]:
+    """Return the YAML beside a URDF, in its folder or in those of packages of ROS."""
+    folder, stem = file.parent, file.stem
+    own = [file.with_suffix(each) for each in YAML]
+    named = [f"{stem}{mark}{LOOPS}" for mark in "._-"] + [LOOPS]
+    places = [f"{place}{name}{end}" for place in _PLACES for name in named for end in YAML]
+    return [each for each in (*own, *(folder / name for name in places)) if each.is_file()]
+
+
+def _others(file: Path) -> list[str]:
+    """Return the names of other files beside a URDF, by which they may hold its loops."""
+    try:
+        names = [each.name for each in os.scandir(file.parent)]
+    except OSError:
+        return []
+    stem = re.escape(file.stem)
+    word = r"(?:loop|closure|closed|constraint)\w*"
+    other = re.compile(rf"(?:{stem}[._-])?{word}\.(?:ya?ml|json|toml)")
+    return sorted(name for name in names if other.fullmatch(name))
 
 
 def _text(file: Path) -> str:
@@ -204,15 +302,26 @@ def _constraints(file: Path) -> ConstraintsFile:
         raise CaseError(str(fault(file, "constraints", f"{error}; export the case anew"))) from None
 
 
-def _pairs(file: Path) -> PairsFile:
+def _pairs(file: Path) -> tuple[PairsFile, list[str]]:
+    """Return the content of a file, and its unread keys.
+
+    Raises:
+        CaseError: it is no such file, or one of those keys may close loops.
+    """
+    data: object = parse_yaml(file, _text(file))
+    known = PairsFile.__struct_fields__
+    keys = cast("dict[str, Any]", data) if isinstance(data, dict) else {}
+    unread = [name for name in keys if name not in known]
+    for name in unread:
+        if similar(name, known) or _CLOSES.search(name.lower()):
+            raise unknown_name(file, name, name, known, f"a key of {', '.join(known)}")
     try:
-        found = msgspec.convert(parse_yaml(file, _text(file)), PairsFile)
+        found = msgspec.convert(data, PairsFile, strict=False)
     except msgspec.ValidationError as error:
         raise fault(
             file,
             "",
-            f"{error}, expected closed_loop, type, name_mot, joint_name and joint_type of"
-            " example-parallel-robots; correct it, or rename a file of another kind",
+            f"{error}, expected {', '.join(known)}; correct it, or rename a file of another kind",
         ) from None
     for key, values, other, others in (
         ("type", found.type, "closed_loop", found.closed_loop),
@@ -233,7 +342,7 @@ def _pairs(file: Path) -> PairsFile:
     for kind in found.type:
         if kind.lower() not in ("3d", "6d"):
             raise fault(file, "type", f"found {shown(kind)}, expected 3d or 6d; correct it")
-    return found
+    return found, unread
 
 
 def _add_pairs(file: Path, pairs: PairsFile, graph: Graph) -> None:
@@ -251,8 +360,43 @@ def _add_pairs(file: Path, pairs: PairsFile, graph: Graph) -> None:
         freedoms: list[Freedom] = [("", "ball", X)] if kind.lower() == "3d" else []
         links, at = (first, second), places[0].at
         graph.loops.append(Joint.of(title, links, at, freedoms, element, frames=places))
+    for k, each in enumerate(pairs.closures, 1):
+        point = vec(each.point)
+        element = Element(file, "", {}, 1, words=f"closures {k}")
+        _add_loop(graph, each, (each.link_a, each.link_b), (point, point), element)
+    for key, rows in (("ball_loops", pairs.ball_loops), ("pin_loops", pairs.pin_loops)):
+        for k, each in enumerate(rows, 1):
+            element = Element(file, "", {}, 1, words=f"{key} {each.name or k}")
+            if (each.axis is None) != (key == "ball_loops"):
+                raise element.fault("axis: expected one in pin_loops alone; correct it")
+            links = each.parent, each.child
+            ends = zip(links, (each.parent_xyz, each.child_xyz), strict=True)
+            points = [graph.places.get(link, ORIGIN).point(vec(at)) for link, at in ends]
+            _add_loop(graph, each, links, points, element)
     coordinates = {move.name for joint in graph.joints for move in joint.moves}
-    graph.tree.actuated |= coordinates & {*pairs.name_mot}
+    graph.tree.actuated |= coordinates & {*pairs.name_mot, *pairs.independent}
+
+
+def _add_loop(
+    graph: Graph,
+    row: HingeOfBase | LoopOfLinks,
+    links: tuple[str, str],
+    points: Sequence[Vec3],
+    element: Element,
+) -> None:
+    """Add a hinge or ball between points of two links, global."""
+    for link in links:
+        if link not in graph.places:
+            raise element.unknown_name("link", link, graph.places, "a link")
+    element.require_two(*links)
+    freedoms: list[Freedom] = [("", "ball", X)]
+    if row.axis is not None:
+        of_base = isinstance(row, HingeOfBase)
+        axis = element.direction(row.axis, "axis")
+        freedoms = [("", "hinge", axis if of_base else graph.places[links[0]].direction(axis))]
+    name = row.name or " = ".join(links)
+    frames = Place(points[0]), Place(points[1])
+    graph.loops.append(Joint.of(name, links, points[0], freedoms, element, frames=frames))
 
 
 def _add_constraints(file: Path, found: ConstraintsFile, graph: Graph) -> None:

@@ -15,9 +15,9 @@ import numpy as np
 
 from ...algebra import ZERO, X, Y, Z, quat, vec
 from ...case.io.document import usable
+from ...case.io.element import ZEROS, Element
 from ...errors import CaseError
 from ...trajectory import Array
-from .element import ZEROS, Element
 from .mjcf_language import Classes, Compiler
 from .place import Place, turn_to, unit_quaternion
 from .tree import Mass, sum_of_masses
@@ -49,16 +49,17 @@ def mass_of(
         raise body.fault("settotalmass: scales all masses, expected masses; write them out")
     inertials = [each for each in parts if each[0].tag == "inertial"]
     geoms = [each for each in parts if each[0].tag == "geom"]
-    if inertials and not (compiler.from_geoms == "true" and geoms):
+    masses: list[Mass] = []
+    from_geoms = compiler.from_geoms == "true" or (compiler.from_geoms == "auto" and not inertials)
+    for element, at, within in geoms if from_geoms else ():
+        complete = classes.complete(element, "geom", within)
+        if (found := _geom(complete, compiler)) is not None:
+            masses.append(found.in_frame(at * compiler.place(complete)))
+    if inertials and not masses:  # no geom in the range of groups has one (measured: MuJoCo 4.0)
         element, at, _ = inertials[-1]
         found = _inertial(element)
         place = at * compiler.place(element)
         return None if found.is_stand_in else _within_bounds(found.in_frame(place), compiler)
-    masses: list[Mass] = []
-    for element, at, within in geoms if compiler.from_geoms != "false" else ():
-        complete = classes.complete(element, "geom", within)
-        if (found := _geom(complete, compiler)) is not None:
-            masses.append(found.in_frame(at * compiler.place(complete)))
     if not masses and any(compiler.least):
         # the least mass is at the body's own `pos`, in its own axes (measured: MuJoCo 4.0)
         masses.append(Mass(0.0, compiler.place(body).at, np.zeros((3, 3))))

@@ -12,16 +12,19 @@ from typing import TypeAlias, cast
 
 from ...algebra import X, quat, vec
 from ...case.io.document import shown
-from ...errors import MOST_NAMED, CaseError, remedy, shortened
+from ...case.io.element import ZEROS, Element, significant_digits, words
+from ...errors import MOST_NAMED, WARNING, CaseError, remedy, shortened
 from ...mechanism.mechanism import GROUND, Vector
-from .element import ZEROS, Element, significant_digits, words
+from .graph import CLOSING
 from .masses import STAND_INS, mass_of
 from .mjcf_language import (
+    APART,
     DYNAMIC,
     EXPANDED,
     IN_BODY,
     MAIN,
     MAKE_BODIES,
+    ORIENTATION,
     ROOT,
     WRITE_OUT,
     Classes,
@@ -58,7 +61,13 @@ OTHERS = {
 _EQUALITIES = ("connect", "weld", "joint", "tendon")
 _Part: TypeAlias = tuple[Element, Place, str]
 """An element, the place of the frame it is given in, and its default class."""
+_INERTIAL = (*words("pos mass diaginertia fullinertia"), *ORIENTATION)
+_OF_AXIS = words("pos axis ref range limited actuatorfrcrange actuatorfrclimited springref")
+"""Attributes without effect on a free joint."""
 _ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
+_TRANSMISSIONS = words(
+    "joint jointinparent tendon site refsite body slidersite cranksite name class"
+)
 RANGES = f"{DYNAMIC['range']} of joints"
 
 
@@ -129,12 +138,14 @@ class _Reader:
         self.disabled = {
             key for flag in flags for key, value in flag.attributes.items() if value == "disable"
         }
+        if "constraint" in self.disabled:  # equalities are some of them
+            self.disabled.add("equality")
         self.stand_ins = any(
             text.attributes.get("name") == STAND_INS
             for custom in root.findall("custom")
             for text in custom.findall("text")
         )
-        tendons = [each for section in root.findall("tendon") for each in section.children]
+        tendons = [each.take() for section in root.findall("tendon") for each in section.children]
         self.coupling = set[str]()
         self.plugins = [(each, "") for part in root.findall("extension") for each in part.children]
         self.tendons = {each.attributes.get("name", ""): each for each in tendons}
@@ -155,7 +166,7 @@ class _Reader:
             unread.require_apart(plugin, link)
         for section in root.findall(*_LEFT_OUT):
             for element in section.children:
-                tree.count(f"{section.tag}: {element.tag}")
+                tree.leave(element, f"{section.tag}: {element.tag}")
         self._equalities()
         self._springs()
         keys = [each for section in root.findall("keyframe") for each in section.findall("key")]
@@ -165,6 +176,7 @@ class _Reader:
             tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
         for section in root.findall("actuator"):
             for motor in section.findall(*_ACTUATORS):
+                motor.require_known(_TRANSMISSIONS, closed=False)
                 tendon = self.tendons.get(motor.attributes.get("tendon", ""))
                 moved = motor
                 if tendon is not None and tendon.tag == "fixed":  # of joints that move as one
@@ -173,9 +185,17 @@ class _Reader:
                 tree.add_motor(f"actuator: {motor.tag}", named & tree.moves.keys())
         ranges = ["range" in tree.moves[name].element.attributes for name in tree.actuated]
         tree.motors[RANGES] = sum(ranges)
+        tied = {tie.element.attributes.get("site1") for tie in tree.ties}
+        for site in tree.sites:
+            other = f"{site[:-1]}2"
+            ends = {site, other} <= tree.sites.keys() and not {site, other} & tied
+            if CLOSING.fullmatch(site) and site.endswith("1") and ends:
+                tree.notes.append(f"{WARNING}no equality holds {site} and {other} together")
+        gravity = self._gravity()
         if tree.masses:
-            tree.gravity = self._gravity()
-        return tree
+            tree.gravity = gravity
+        self.classes.take()
+        return tree.settled(root, APART)
 
     def _read_bodies(self, world: Element) -> None:
         """Read the bodies of a world and what is in them, depth first."""
@@ -194,15 +214,19 @@ class _Reader:
                         )
                     )
                 case "site":
-                    site = self.classes.complete(element, "site", childclass)
+                    site = self.classes.complete(element.take(), "site", childclass)
                     if (name := site.attributes.get("name")) is not None:
                         self.tree.mark(site, name, link, place * self.compiler.place(site))
+                    else:
+                        self.tree.leave(element, "sites without a name")
                 case "joint" | "freejoint" if link == WORLD:
                     raise element.fault("is in no body, expected joints in bodies; remove it")
-                case "joint" | "freejoint" | "inertial":
+                case "joint" | "freejoint":
                     pass
+                case "inertial":
+                    element.take(*_INERTIAL)  # motion does not need it
                 case _:
-                    self.tree.count(f"{element.tag}s")
+                    self.tree.leave(element, f"{element.tag}s")
                     if element.tag == "plugin":
                         self.plugins.append((element, link))
 
@@ -211,7 +235,7 @@ class _Reader:
     ) -> tuple[str, Iterator[_Part]]:
         """Hang a body; return its name and content."""
         tree = self.tree
-        if (name := element.attributes.get("name")) is None:
+        if (name := element.take().attributes.get("name")) is None:
             name = tree.names.new(f"body{len(tree.places)}")
         place = around * self.compiler.place(element)
         # one more than are read is too many already
@@ -247,6 +271,7 @@ class _Reader:
             if element.tag != "frame":
                 yield element, at, within
                 continue
+            element.take()
             inner, own = (
                 at * self.compiler.place(element),
                 element.attributes.get("childclass", within),
@@ -261,6 +286,7 @@ class _Reader:
             if element.tag in ("joint", "freejoint")
         ]
         for k, (element, at, within) in enumerate(found, 1):
+            element.take()
             if element.tag == "joint":
                 element = self.classes.complete(element, "joint", within)
             own = name if len(found) == 1 else f"{name}.{k}"
@@ -278,6 +304,7 @@ class _Reader:
                     " where anchors and relpose mean something else, expected the frame of the"
                     ' file; set align="false" and give them in that'
                 )
+            element.take(*_OF_AXIS)
             return Move(name, kind, body.at, X, element)
         for attribute, what in DYNAMIC.items():
             if attribute in element.attributes:
@@ -286,8 +313,9 @@ class _Reader:
         point = given.point(vec(element.numbers("pos", 3, default=ZEROS)))
         limit = self._limit(element)
         if kind == "hinge":
+            reference = self.compiler.angle(reference)
+        if kind != "slide":
             angle = self.compiler.angle
-            reference = angle(reference)
             limit = replace(limit, lower=angle(limit.lower), upper=angle(limit.upper))
         axis = element.direction(element.numbers("axis", 3, default=(0.0, 0.0, 1.0)), "axis")
         return Move(name, kind, point, given.direction(axis), element, reference, limit)
@@ -323,14 +351,14 @@ class _Reader:
         names = set[str]()
         for section in self.root.findall("equality"):
             for k, bare in enumerate(section.children, 1):
-                element = self.classes.complete(bare, "equality")
+                element = self.classes.complete(bare.take(), "equality")
                 if element.tag not in _EQUALITIES:
                     raise element.fault(
                         "cannot be read: there is no joint for it; expected one of"
                         f" {', '.join(_EQUALITIES)}; remove it"
                     )
                 if "equality" in self.disabled or not element.flag("active", default=True):
-                    self.tree.count("equalities that are not active")
+                    self.tree.leave(bare, "equalities that are not active")
                     continue
                 name = element.attributes.get("name", f"{element.tag}{k}")
                 if name in names:
@@ -353,7 +381,7 @@ class _Reader:
                 " <connect>"
             )
         holds = "frame" if welded else "point"
-        if "site1" in element.attributes:
+        if "site1" in element.attributes or "site2" in element.attributes:
             (i, first), (j, second) = (self._site(element, key) for key in ("site1", "site2"))
             if welded:
                 first = first * ORIGIN
@@ -432,7 +460,7 @@ class _Reader:
                 f"tendon1: {tendon} goes over {way}, expected two sites; there is no joint for"
                 " others"
             )
-        (i, first), (j, second) = (self._site(child, "site") for child in tendon.children)
+        (i, first), (j, second) = (self._site(child.take(), "site") for child in tendon.children)
         apart = second.at - first.at
         length = math.sqrt(apart @ apart) + _coefficients(element)[0]
         if i == j or not (apart @ apart > 0.0 and length > 0.0):
@@ -455,23 +483,25 @@ class _Reader:
         for move in tree.moves.values():
             element = move.element
             try:
-                law = self._law(element)
+                law, rest = self._law(element), element.number("springref", 0.0)
                 if any(law):
-                    rest = element.number("springref", 0.0)
                     rest = self.compiler.angle(rest) if move.kind == "hinge" else rest
                     tree.springs[move.name] = Spring(*law, rest)
             except CaseError:
+                element.take("stiffness", "damping", "springref")
                 for key, what in (("stiffness", "springs"), ("damping", "damping")):
                     if {key, "springdamper"} & element.attributes.keys():
                         tree.count(f"{what} of joints")
         for section in self.root.findall("tendon"):
             for tendon in section.children:
-                self._limit(self.classes.complete(tendon, "tendon"))
+                whole = self.classes.complete(tendon, "tendon")
+                tree.tendons[whole.attributes.get("name", f"tendon {len(tree.tendons)}")] = whole
+                self._limit(whole)
                 try:
                     strut = self._strut(tendon)
                 except CaseError:
                     if tendon.attributes.get("name") not in self.coupling:
-                        tree.count(f"tendon: {tendon.tag}")
+                        tree.leave(tendon, f"tendon: {tendon.tag}")
                 else:
                     tree.add_strut(strut)
 
@@ -497,7 +527,7 @@ class _Reader:
         """
         tendon, tree = self.classes.complete(bare, "tendon"), self.tree
         stiffness, damping = self._law(tendon)
-        sites = [str(child.attributes.get("site")) for child in tendon.children]
+        sites = [str(child.take().attributes.get("site")) for child in tendon.children]
         if tendon.tag != "spatial" or len(sites) != 2 or not {*sites} <= tree.sites.keys():
             raise tendon.fault("goes elsewhere than between two sites")
         (i, first), (j, second) = (tree.sites[site] for site in sites)
@@ -516,11 +546,9 @@ class _Reader:
         """Return the gravity [m/s^2]; the last option counts."""
         found = self.tree.gravity
         for option in self.root.findall("option"):
-            if any(flag.attributes.get("gravity") == "disable" for flag in option.findall("flag")):
-                return ZEROS
             x, y, z = option.numbers("gravity", 3, default=found)
             found = x, y, z
-        return found
+        return ZEROS if "gravity" in self.disabled else found
 
 
 def _coefficients(element: Element) -> tuple[float, ...]:

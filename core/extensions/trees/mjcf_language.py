@@ -13,9 +13,10 @@ from os.path import isfile
 from pathlib import Path
 
 from ...algebra import IDENTITY, ZERO, Quat, X, Y, Z, cross, quat, vec
-from ...case.io.case_file import LARGEST_FILE
 from ...case.io.document import read_text, shown
-from .element import MOST_ELEMENTS, ZEROS, Element, file_near, parse_xml, words
+from ...case.io.element import MOST_ELEMENTS, ZEROS, Apart, Element, file_near, parse_xml, words
+from ...case.io.ledger import Asked
+from ...case.io.readers import LARGEST_FILE
 from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion
 
 ORIENTATION = words("quat axisangle xyaxes zaxis euler")
@@ -41,7 +42,7 @@ KNOWN = {
     "body": (*_FRAME, *words("mocap gravcomp user sleep fuse simple")),
     "frame": _FRAME,
     "replicate": words("count sep offset euler childclass"),
-    "key": words("name time qpos qvel act mpos mquat ctrl"),
+    "key": words("name time qpos qvel act mpos mquat ctrl plastic"),
     "joint": ("name", "class", *_JOINT),
     "freejoint": ("name", "group", "align"),
     "site": (*ORIENTATION, *words("name class type group pos material mesh size fromto rgba user")),
@@ -56,17 +57,32 @@ KNOWN = {
     "pulley": ("divisor",),
     "fixed joint": ("joint", "coef"),
 }
-_TENDON = words("name class stiffness damping springlength")
+_TENDON = (
+    *words("name class group limited range actuatorfrclimited actuatorfrcrange solreflimit"),
+    *words("solimplimit solreffriction solimpfriction margin material rgba width user"),
+    *words("frictionloss springlength springyield stiffness damping armature"),
+)
 _OPEN = {
     "geom": (
         *ORIENTATION,
         *words("name class type size fromto pos mass density group shellinertia mesh"),
     ),
-    "option": ("gravity",),
-    "flag": words("gravity equality spring damper passive"),
+    "option": (
+        *words("actuatorgroupdisable ccd_iterations ccd_tolerance cone density gravity impratio"),
+        *words("integrator iterations jacobian ls_iterations ls_tolerance magnetic"),
+        *words("noslip_iterations noslip_tolerance o_friction o_margin o_solimp o_solref"),
+        *words("sdf_initpoints sdf_iterations sleep_tolerance solver timestep tolerance viscosity"),
+        *words("wind mpr_iterations mpr_tolerance apirate collision"),
+    ),
+    "flag": (
+        *words("actuation autoreset clampctrl constraint contact damper diagexact energy equality"),
+        *words("eulerdamp filterparent frictionloss fwdinv gravity invdiscrete ipc island limit"),
+        *words("midphase multiccd nativeccd override refsafe sensor sleep speculative spring"),
+        *words("warmstart passive"),
+    ),
     **dict.fromkeys(("spatial", "fixed", "default tendon"), _TENDON),
 }
-"""Attributes read of elements with many others, and more in other releases of MuJoCo."""
+"""Attributes of elements with many others, and more in other releases of MuJoCo."""
 _ALL = KNOWN | _OPEN
 
 _READ = words("compiler option default worldbody tendon equality")
@@ -93,6 +109,42 @@ WRITE_OUT = (
     'let MuJoCo write the model out and give that file: python -c "import mujoco;'
     " mujoco.mj_saveLastXML('flat.xml', mujoco.MjModel.from_xml_path('model.xml'))\""
 )
+
+APART = Apart(
+    "MJCF",
+    {
+        "": words("name class childclass user group material rgba"),
+        "mujoco": words("model <size> <statistic> <visual>"),
+        "compiler": (
+            *words("assetdir conflict discardvisual fitaabb fusestatic meshdir passthrough"),
+            *words("savecanonical savecompiled saveinertial strippath texturedir usethread"),
+            "<lengthrange>",
+        ),
+        "option": _OPEN["option"],
+        "flag": _OPEN["flag"],
+        "default": words(
+            "<mesh> <texture> <material> <camera> <light> <pair> <general> <motor> <position>"
+            " <velocity> <intvelocity> <orientation> <pid> <damper> <cylinder> <muscle> <adhesion>"
+            " <dcmotor>"
+        ),
+        "body": words("mocap gravcomp sleep fuse simple"),
+        "joint": words(
+            "springyield armature frictionloss actuatorgravcomp margin solreflimit solimplimit"
+            " solreffriction solimpfriction"
+        ),
+        "site": words("type size mesh"),
+        **dict.fromkeys(
+            (
+                *("connect", "weld", "equality joint", "equality tendon", "equality"),
+                "default equality",
+            ),
+            (*_SOFT, "anchor"),
+        ),
+        **dict.fromkeys(("spatial", "fixed", "tendon", "default tendon"), _TENDON),
+    },
+    extended=("option", "flag"),
+)
+"""Names of MJCF without meaning for kinematics."""
 
 DYNAMIC = {
     "range": "ranges",
@@ -134,6 +186,8 @@ class Classes:
 
     def __init__(self, root: Element) -> None:
         self._attributes: dict[str, dict[str, dict[str, str]]] = {MAIN: {}}
+        self._defaults: list[Element] = []
+        self._asked: dict[str, list[set[str]]] = {}
         for top in root.findall("default"):
             top.choice("class", (MAIN,), MAIN)
             waiting = [(top, MAIN, MAIN)]
@@ -147,6 +201,7 @@ class Classes:
                 own = {kind: dict(values) for kind, values in self._attributes[around].items()}
                 for child in element.findall(*_IN_CLASSES):
                     own[child.tag] = _merged(own.get(child.tag, {}), child.attributes)
+                    self._defaults.append(child)
                 self._attributes[name] = own
                 inner = [*element.findall("default")][::-1]
                 waiting += [(each, each.attributes.get("class", ""), name) for each in inner]
@@ -159,7 +214,19 @@ class Classes:
         if name not in self._attributes:
             raise element.unknown_name("class", name, self._attributes, "a default class")
         found = _merged(self._attributes[name].get(kind, {}), element.attributes)
-        return replace(element, attributes=found)
+        self._asked.setdefault(kind, []).append(element.asked)
+        return replace(element, attributes=Asked(found, element.asked))
+
+    def take(self) -> None:
+        """Mark the questions to elements of a kind in its defaults; those of no element
+        have no meaning.
+        """
+        for default in self._defaults:
+            asked = self._asked.get(default.tag)
+            if asked and default.tag != "geom":  # geoms are listed, and read for masses alone
+                default.take(*set[str]().union(*asked))
+            else:
+                default.leave()
 
 
 def _merged(inherited: Mapping[str, str], own: Mapping[str, str]) -> dict[str, str]:
@@ -221,6 +288,7 @@ class Compiler:
         ):  # of a site; its z axis goes from the second to the first
             numbers = element.numbers("fromto", 6)
             first, second = vec(numbers[:3]), vec(numbers[3:])
+            element.asked.update(("pos", *ORIENTATION))  # without effect beside it
             axis = element.direction((*(first - second),), "fromto")
             return Place(0.5 * (first + second), turn_to(axis))
         at = vec(element.numbers("pos", 3, default=ZEROS))

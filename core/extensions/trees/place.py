@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,13 +17,9 @@ from ...algebra import (
     cross,
     quat,
     rotation_less_identity,
-    vec,
 )
 from ...case.io.document import SMALLEST
 from ...mechanism.mechanism import Vector
-
-# Error of the length of a unit vector by the rounding of its components.
-_ROUND_OFF = 2.0 * sys.float_info.epsilon
 
 
 @dataclass(frozen=True)
@@ -64,16 +59,6 @@ def unit_quaternion(q: Quat) -> Quat:
     """Return the quaternion at length one; composing many would let it drift."""
     length = math.sqrt(sum(e * e for e in q))
     return quat([e / length for e in q])
-
-
-def unit_vector(numbers: Sequence[float]) -> Vec3:
-    """Return the direction of three numbers, length one; unchanged if they have it to the last
-    digit, so that a file keeps its own numbers. Not for zero.
-    """
-    length = math.hypot(*numbers)
-    if abs(length - 1.0) <= _ROUND_OFF:
-        return vec(numbers)
-    return vec([each / length for each in numbers])
 
 
 def coordinates(a: Vec3) -> Vector:

@@ -19,8 +19,8 @@ from typing import TypeAlias
 
 from ...algebra import Vec3, X, cross
 from ...case.io.document import decimal, shown, usable
+from ...case.io.element import Element, Names, words
 from ...errors import CaseError
-from .element import Element, Names, words
 from .graph import Freedom, Graph, Joint, global_frames
 from .place import Place, coordinates, turn_of_axes
 from .tree import BushingLaw, Coupling, Kind, Spring, Strut
@@ -131,6 +131,8 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
     """
     found: dict[tuple[str, str], list[tuple[Element, Vec3, Vec3]]] = {}
     for element, link_of, frame_of in elements:
+        if element.tag in (BALL, STRUT, BUSHING):
+            element.take("name")  # several ties of a frame have one name
         if element.tag == BALL:
             links, points = _ends(element, link_of)
             found.setdefault(links, []).append((element, *points))
@@ -138,7 +140,7 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
             try:
                 graph.struts.append(_strut(graph, element, link_of))
             except CaseError:
-                graph.tree.count(STRUT)
+                graph.tree.leave(element, STRUT)
         elif element.tag == BUSHING:
             graph.struts.append(_bushing_strut(element, frame_of))
             graph.tree.notes.append(f"{element}: {HALFWAY}")
@@ -190,14 +192,15 @@ def _bushing_strut(element: Element, frame_of: FrameOf) -> Strut:
     for part in laws:
         if element.child(part) is None:
             raise element.fault(f"<{part}>: missing, expected three numbers; add it")
-    values = [coordinates(element.child_vector(part)) for part in laws]
+    forces, torques, damping, turning = values = [
+        coordinates(element.child_vector(part)) for part in laws
+    ]
     if min(map(min, values)) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
     element.require_two(first, second)
     links = first, second
-    return Strut(
-        _name(element, links), links, (place, other), BushingLaw(*values), element, BUSHING
-    )
+    law = BushingLaw(forces, torques, damping, turning)
+    return Strut(_name(element, links), links, (place, other), law, element, BUSHING)
 
 
 def _named_child(element: Element, part: str) -> tuple[Element, str]:

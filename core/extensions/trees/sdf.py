@@ -14,10 +14,10 @@ from functools import partial
 from pathlib import Path
 
 from ...algebra import Vec3, X, Y, Z
-from ...case.io.case_file import LARGEST_FILE
 from ...case.io.document import read_text, shown
+from ...case.io.element import EXTENDED, TAKEN, ZEROS, Apart, Element, file_near, parse_xml, words
+from ...case.io.readers import LARGEST_FILE
 from ...errors import CaseError
-from .element import ZEROS, Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
 from .masses import mass_in
 from .place import ORIGIN, Place
@@ -67,6 +67,7 @@ IN_LINK = words(
 IN_JOINT = (
     *words("parent child pose axis axis2 physics sensor thread_pitch"),
     *("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body", "frame", MIMIC),
+    *(*FRICTION[1:], "drake:controller_gains"),
 )
 BARE = words("parent child screw_thread_pitch gearbox_ratio gearbox_reference_body")
 """Those without attributes."""
@@ -81,10 +82,9 @@ IN_WORLD = (
 )
 IN = {"sdf": IN_ROOT, "world": IN_WORLD, "model": IN_MODEL, "link": IN_LINK}
 """Known elements, by the one around them."""
-IN_LIMIT = words("lower upper effort velocity stiffness dissipation")
+IN_LIMIT = words("lower upper effort velocity stiffness dissipation drake:acceleration")
 IN_DRAKE = words("drake:parent drake:child drake:damping")
 _READ = (*words("model world link joint frame pose static"), BALL, STRUT, BUSHING, DRAKE_JOINT)
-_COUNTED = words("visual collision sensor light plugin")
 # Three for each body that other models may have.
 MOST_FRAMES = 6_000
 GRAVITY = (0.0, 0.0, -9.8)
@@ -93,6 +93,16 @@ MOST_INCLUDES, _SUFFIXES = 100, (".sdf", ".world", ".config")
 _WRITE_OUT = "write the whole model out: gz sdf -p FILE > flat.sdf"
 # Cosine between an axis and that of a hinge it means, which few digits leave.
 ALONG = 1.0 - 1e-6
+APART = Apart(
+    "SDF",
+    {
+        "sdf": ("version",),
+        "inertial": words("<mass> <pose> <inertia> <density> <frame> <auto_inertia_params>"),
+        "inertia": tuple(f"<{each}>" for each in ENTRIES),
+    },
+    extended=(*EXTENDED, "inertial"),
+)
+"""Names of SDF without meaning for kinematics."""
 UNIT = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """Inertia of a link unless given, of 1 kg [kg m^2]."""
 # Axes were in the model's frame before this version.
@@ -215,9 +225,13 @@ def read_sdf(root: Element) -> Tree:
     for full, framed in frames.models.items():
         framed.element.require_children(IN_MODEL)
         for child in framed.element.children:
-            if child.tag in _COUNTED or (":" in child.tag and child.tag not in _READ):
-                graph.tree.count(child.tag)
+            if child.tag not in _READ:
+                graph.tree.leave(child, child.tag)
         frames.place(framed.element, full)
+    for world in (root, *worlds):
+        for child in world.children:
+            if child.tag not in (*_READ, "gravity"):
+                graph.tree.leave(child, child.tag)
     for world in worlds:
         if (gravity := world.child("gravity")) is not None:
             x, y, z = gravity.text_numbers(3, default=GRAVITY)
@@ -234,7 +248,8 @@ def read_sdf(root: Element) -> Tree:
         if framed.element.tag == "frame" and (link := frames.link(framed.element, framed.attached)):
             place = frames.place(framed.element, full)
             graph.frames[frames.short_name(full)] = frames.short_name(link), place
-    return graph.hang()
+    graph.close_named_pairs()
+    return graph.hang().settled(root, APART)
 
 
 def _add_links(graph: Graph, frames: Frames) -> None:
@@ -245,10 +260,11 @@ def _add_links(graph: Graph, frames: Frames) -> None:
         graph.elements[name] = framed.element
         if frames.is_still(full):
             graph.fixed.add(name)
-        for inertial in [*framed.element.findall("inertial")][:1]:
+        if (inertial := framed.element.child("inertial")) is not None:
             graph.masses[name] = _mass(inertial)
-        for child in framed.element.findall(*_COUNTED):
-            graph.tree.count(child.tag)
+        for child in framed.element.children:
+            if child.tag not in ("inertial", "pose"):
+                graph.tree.leave(child, child.tag)
     if not graph.places:
         raise graph.root.fault("has no link, expected a mechanism; give a model that moves")
     if graph.masses:
@@ -337,7 +353,7 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
         (first, _), (second, _) = _ends(graph, frames, framed, ("parent", "child"))
         links = first, second
         if {*links} <= graph.fixed:
-            graph.tree.count("joints of what stands still")
+            graph.tree.leave(element, "joints of what stands still")
             continue
         joint = _Joint(graph, frames, full, version)
         if joint.kind == GEARBOX:
@@ -413,14 +429,24 @@ class _Joint:
         if (element := self.element.child(MIMIC)) is not None:
             mimics.append(self._drake_mimic(moves, element))
         self.graph.couplings += mimics
+        self._leave_rest()
         return replace(joint, moves=moves)
+
+    def _leave_rest(self) -> None:
+        """List parts without use for a joint of its type, such as the axis of a ball."""
+        axes = [*self.element.findall("axis", "axis2")]
+        limits = [limit for axis in axes for limit in axis.findall("limit")]
+        for around in (self.element, *axes, *limits):
+            for child in around.children:
+                if TAKEN not in child.marks:
+                    self.graph.tree.leave(child, f"{child.tag} of {around.tag}")
 
     def _limit(self, move: Move) -> Limit:
         axis = self.element.child("axis2" if move.name.endswith(".2") else "axis")
         found = axis and axis.child("limit")
         if not found:
             return NO_LIMIT
-        limit = limit_of(found, {each.tag: each.text for each in found.children})
+        limit = limit_of(found, {each.tag: each.text for each in found.findall(*IN_LIMIT[:4])})
         sizes = (each if each >= 0.0 else math.inf for each in (limit.effort, limit.velocity))
         return Limit(limit.lower, limit.upper, *sizes)
 
@@ -451,6 +477,7 @@ class _Joint:
                     f"<{tag}>: there is no hinge between {link!r} and {named!r} along it, expected"
                     " one, whose turn the gearbox couples; correct the axis, or write <mimic>"
                 )
+        self._leave_rest()
         return Coupling(self.name, weights, {}, (0.0,), element)
 
     def _freedoms(self) -> list[Freedom]:
@@ -489,7 +516,8 @@ class _Joint:
             xyz.require_known(("expressed_in",), "SDF")
             numbers = xyz.text_numbers(3, default=numbers)
             given = xyz.attributes.get("expressed_in", "")
-        if flag_of(axis.child("use_parent_model_frame")) or self.version < _AXES_IN_JOINT:
+        of_model = flag_of(axis.child("use_parent_model_frame"))
+        if of_model or self.version < _AXES_IN_JOINT:
             given = given or MODEL
         if given:
             place = self.frames.place(axis, full_name_of(self.framed.scope, given))
@@ -498,11 +526,12 @@ class _Joint:
     def _add_spring(self, move: Move, axis: Element) -> None:
         for dynamics in axis.findall("dynamics"):
             if self.kind == "screw":  # of the turn or of the shift
-                self.graph.tree.count("dynamics of screw joints")
+                self.graph.tree.leave(dynamics, "dynamics of screw joints")
                 return
             dynamics.require_known((), "SDF")
             dynamics.require_children((*LAW, *FRICTION), closed=True)
-            add_spring(self.graph, move.name, {each.tag: each.text for each in dynamics.children})
+            said = {each.tag: each.text for each in dynamics.findall(*LAW, *FRICTION)}
+            add_spring(self.graph, move.name, said)
 
     def _mimic(self, move: Move, element: Element) -> Coupling:
         """Return the mimic of an axis."""

@@ -19,12 +19,12 @@ import numpy as np
 
 from ...algebra import ZERO, Vec3, X, Y, Z
 from ...case.io.document import LARGEST, decimal, fault, shown
+from ...case.io.element import Account, Apart, Element, Names, settle
 from ...errors import CaseError, MechanismError
 from ...joints import PiecewisePolynomial, Spline
 from ...mechanism.loads import Law
 from ...mechanism.mechanism import GROUND, Vector
 from ...trajectory import Array
-from .element import Element, Names
 from .place import ORIGIN, Place
 
 WORLD = "world"
@@ -38,6 +38,9 @@ BETWEEN = 1e-9, 1e-12
 """Those for a link between the freedoms of a joint, in a file with masses: no simulator sees them
 in the motion of what it carries.
 """
+
+COPY = ".copy"
+"""End of the name of a link moved by the joint of a loop, and held to another link."""
 
 Kind: TypeAlias = Literal["hinge", "slide", "ball", "free"]
 UNKNOWNS: Mapping[str, int] = {"hinge": 1, "slide": 1, "ball": 3, "free": 6}
@@ -326,6 +329,7 @@ class Tree:
             one.
         unweighed: moving links whose masses cannot be read.
         springs: by move; others are of no move of the tree.
+        tendons: of MJCF, with their default classes, by name.
         actuated: moves with a motor.
         motors: numbers of parts of motors and of limits of their moves, by their names in
             `left_out`, where they are unless they say what drives the model.
@@ -334,6 +338,7 @@ class Tree:
         left_out: numbers of parts without a meaning for kinematics, by name.
         notes: of its reader, beside every verdict.
         without: names by which the user leaves out elements.
+        account: of the whole file, when it is read.
     """
 
     file: Path
@@ -354,6 +359,7 @@ class Tree:
     ties: list[Tie] = field(default_factory=list[Tie])
     springs: dict[str, Spring] = field(default_factory=dict[str, Spring])
     struts: list[Strut] = field(default_factory=list[Strut])
+    tendons: dict[str, Element] = field(default_factory=dict[str, Element])
     actuated: set[str] = field(default_factory=set[str])
     motors: Counter[str] = field(default_factory=Counter[str])
     starts: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
@@ -362,6 +368,7 @@ class Tree:
     notes: list[str] = field(default_factory=list[str])
     without: set[str] = field(default_factory=set[str])
     names: Names = field(default_factory=Names)
+    account: Account | None = None
 
     @cached_property
     def joints(self) -> Mapping[str, Move]:
@@ -375,6 +382,21 @@ class Tree:
     def count(self, what: str) -> None:
         """Count one more omitted item."""
         self.left_out[what] += 1
+
+    def leave(self, element: Element, what: str) -> None:
+        """Count one more omitted element, with all in it."""
+        element.leave()
+        self.count(what)
+
+    def settled(self, root: Element, apart: Apart) -> Tree:
+        """Return the tree, with the unread names of its file among the parts left out.
+
+        Raises:
+            CaseError: one of them may mean something for kinematics; see `settle`.
+        """
+        self.account = settle(root, apart)
+        self.left_out.update(self.account.left_out)
+        return self
 
     def add_motor(self, part: str, moves: Collection[str]) -> None:
         """Add a motor of moves, which is a part that is left out."""

@@ -16,9 +16,9 @@ from dataclasses import replace
 
 from ...algebra import Quat, Vec3, X, Y, Z, vec
 from ...case.io.document import shown
+from ...case.io.element import ZEROS, Apart, Element, words
 from ...errors import CaseError
 from ...joints.base import triad
-from .element import ZEROS, Element, words
 from .graph import Freedom, Graph, Joint
 from .loop_files import read_loop_files
 from .masses import mass_in
@@ -55,9 +55,13 @@ IN_ROBOT = (
 )
 """Elements of a robot, of its planners and simulators; others without a prefix are unknown."""
 IN_LINK = ("inertial", "visual", "collision")
-LOOKS = words("material sensor contact audio_source self_collision_checking")
+LOOKS = words(
+    "material sensor contact audio_source self_collision_checking collision_checking self_filter"
+)
 """Elements of links without a meaning for motion."""
-IN_LIMIT = words("lower upper effort velocity acceleration deceleration jerk drake:acceleration")
+IN_LIMIT = words(
+    "lower upper effort velocity acceleration deceleration jerk drake:acceleration command_effort"
+)
 IN_GAZEBO = ("joint", "frame")
 IN_JOINT = (
     *words("origin parent child axis mimic limit"),
@@ -74,6 +78,21 @@ DRAKE_TYPES = ("ball", "planar", "screw", "universal")
 # Of the axes of SDF in <gazebo>: those in the joint's own frame.
 SDF_VERSION = (1, 7)
 
+APART = Apart(
+    "URDF",
+    {
+        "robot": ("version",),
+        "joint": ("dont_collapse",),
+        "link": ("type",),
+        "limit": IN_LIMIT,
+        "dynamics": FRICTION,
+        "mass": ("value",),
+        "inertia": ENTRIES,
+        "origin": POSE,
+    },
+)
+"""Names of URDF without meaning for kinematics."""
+
 _AXES = {"x": X, "y": Y, "z": Z}
 
 
@@ -87,7 +106,7 @@ def read_urdf(root: Element) -> Tree:
     robot.read()
     tree = robot.graph.hang()
     robot.beside.place(tree)
-    return tree
+    return tree.settled(root, APART)
 
 
 class _Robot:
@@ -98,7 +117,7 @@ class _Robot:
         name, beside = root.attributes.get("name", root.file.stem), self.beside.names
         others = f" with {', '.join(beside)}" if beside else ""
         described = f"URDF robot {name!r} of {root.file.name}{others}"
-        self.graph = Graph.of(root, described, closes=self.beside.pairs is None)
+        self.graph = Graph.of(root, described, closes=not self.beside.pairs)
         self.joints: dict[str, Element] = {}
 
     def read(self) -> None:
@@ -110,7 +129,7 @@ class _Robot:
                     "is a macro, expected plain URDF; expand the file: xacro FILE > robot.urdf"
                 )
             if child.tag not in READ and not any(_joints_of_sdf(child)):
-                graph.tree.count(child.tag)
+                graph.tree.leave(child, child.tag)
         root.require_known(("name", "version"), "URDF", closed=False)
         root.require_children(IN_ROBOT)
         self._links()
@@ -134,6 +153,7 @@ class _Robot:
 
         add_ties(graph, ((each, self._require_link, framed) for each in root.children))
         self.beside.add(graph)
+        graph.close_named_pairs()
         self._require_apart(frames)
         for motor in root.findall("transmission", "ros2_control"):
             names = {
@@ -154,11 +174,11 @@ class _Robot:
             graph.elements[name] = element
             element.require_known(("name", "type"), "URDF", closed=False)
             element.require_children((*IN_LINK, *LOOKS))
-            for each in [*element.findall("inertial")][:1]:
-                graph.masses[name] = _mass(each)
+            if (inertial := element.child("inertial")) is not None:
+                graph.masses[name] = _mass(inertial)
             for child in element.children:
                 if child.tag != "inertial":
-                    graph.tree.count(child.tag)
+                    graph.tree.leave(child, child.tag)
         parents = [each for joint in root.findall(*JOINTS) for each in joint.findall("parent")]
         if any(each.attributes.get("link") == WORLD for each in parents):
             graph.elements.setdefault(WORLD, root)  # as in Drake, which has it without a link
@@ -171,7 +191,7 @@ class _Robot:
         above: dict[str, str] = {}
         below: dict[str, list[tuple[str, Element]]] = {}
         for element in self.root.findall(*JOINTS):
-            element.require_known(("name", "type"), "URDF")
+            element.require_known(("name", "type", "dont_collapse"), "URDF")
             name = element.require("name")
             if name in self.joints:
                 raise element.repeated_name(name, "the joints")
@@ -187,9 +207,9 @@ class _Robot:
             self._damper(name, element)
             for limit in element.findall("limit"):
                 limit.require_known(IN_LIMIT, "URDF")
-            for each in ("limit", "calibration", "safety_controller", "joint_properties"):
-                if any(element.findall(each)):
-                    graph.tree.count(f"{each} of joints")
+                graph.tree.count("limit of joints")
+            for each in element.findall("calibration", "safety_controller", "joint_properties"):
+                graph.tree.leave(each, f"{each.tag} of joints")
         roots = [name for name in graph.elements if name not in above]
         if len(roots) != 1:
             listed = ", ".join(roots[:5]) or "none"
@@ -217,7 +237,7 @@ class _Robot:
             if element.attributes.get("type") in ("revolute", "continuous", "prismatic"):
                 add_spring(self.graph, name, dynamics.attributes)
             else:
-                self.graph.tree.count("dynamics of joints")
+                self.graph.tree.leave(dynamics, "dynamics of joints")
 
     def _require_link(self, element: Element, name: str, key: str = "name") -> str:
         """Return a name of a link."""
@@ -238,7 +258,11 @@ class _Robot:
         links = self._link(element, "parent"), self._link(element, "child")
         place = graph.places[links[1]]
         types = DRAKE_TYPES if element.tag == DRAKE_JOINT else TYPES
-        kind = self.beside.types.get(name) or element.choice("type", types, "")
+        said = element.choice("type", types, "") if name not in self.beside.types else ""
+        kind = self.beside.types.get(name, said)
+        element.take("type")
+        for each in element.findall("axis"):
+            each.asked.add("xyz")  # of a joint without an axis too
 
         def axis() -> Vec3:
             return _axis(element, "axis", place)
@@ -334,6 +358,9 @@ class _Robot:
                 raise element.fault("is of SDF, expected links of URDF; write it as <link>")
             if any(_joints_of_sdf(gazebo)):
                 frames.read(gazebo, "")
+                for element in gazebo.children:
+                    if element.tag not in IN_GAZEBO:
+                        graph.tree.leave(element, element.tag)
         still = {*graph.fixed}
         graph.loops += joints_of(graph, frames, SDF_VERSION)
         for full, framed in frames.joints.items():
@@ -369,6 +396,7 @@ def _limit(element: Element) -> Limit:
     found = element.child("limit")
     if found is None:
         return NO_LIMIT
+    found.take("lower", "upper", "effort", "velocity")
     texts = {"lower": "0", "upper": "0", **found.attributes}
     if element.attributes.get("type") == "continuous":
         texts |= {"lower": "", "upper": ""}
@@ -383,9 +411,9 @@ def _mass(element: Element) -> Mass | None:
         child.require_known({"mass": ("value",), "inertia": ENTRIES}.get(child.tag, POSE), "URDF")
     try:
         mass, matrix = element.child("mass"), element.child("inertia")
+        entries = [0.0 if matrix is None else matrix.number(name, 0.0) for name in ENTRIES]
         if mass is None:
             return None
-        entries = [0.0 if matrix is None else matrix.number(name, 0.0) for name in ENTRIES]
         return mass_in(_origin(element.child("origin")), mass.number("value"), entries)
     except CaseError:
         return None

@@ -28,9 +28,9 @@ from ...mechanism.motions import Path
 from ...program import ITERATIONS, NODES, Plan, groups_behind
 from ...program.disk_cache import load_or_make
 from ...program.llvm import compiler
-from ...program.llvm.compiler import available
 from ...program.llvm.executor import Executor, bind
-from ...program.llvm.jit import LlvmCode, make_loops_ready
+from ...program.llvm.jit import LlvmCode
+from ...program.llvm.machine_code import available
 from ...trajectory import Array
 from ..formulation.constraints import Frames
 from ..formulation.state_vectors import samples
@@ -99,7 +99,7 @@ def load_or_trace(mechanism: Mechanism, request: Request, alike: Alike | None = 
     Raises:
         SolveError: drivers and degrees of freedom do not match.
     """
-    compiled = request.compiled and compiler.available()
+    compiled = request.compiled and available()
     lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
     if alike or request.varied or not (is_builtin(mechanism) and compiled):
         return _trace(mechanism, request, alike, lanes)
@@ -232,8 +232,6 @@ def compile_model(mechanism: Mechanism, request: Request, alike: Alike | None = 
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
             the design position.
     """
-    if request.compiled and available():
-        make_loops_ready()
     return Model(mechanism, request, load_or_trace(mechanism, request, alike))
 
 

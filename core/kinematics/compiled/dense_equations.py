@@ -18,9 +18,10 @@ from ...algebra import Scalar
 from ...mechanism.motions import Path
 from ...primitives.base import Twist
 from ...program import Plan, Program, program
-from ...program.llvm.compiler import available, vector_width
+from ...program.llvm.compiler import vector_width
 from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode
+from ...program.llvm.machine_code import available
 from ...program.straight_line import bytecode
 from ...trajectory import Array
 from ..formulation.cartesian import Cartesian

@@ -59,6 +59,10 @@ Further: TypeAlias = Callable[[dict[int, Scalar], Sequence[Scalar], Sequence[Sca
 """Adds to the outputs of a program, from rates of the unknowns and their accelerations."""
 
 
+def nothing_further(out: dict[int, Scalar], v: Sequence[Scalar], a: Sequence[Scalar]) -> None:
+    """Add nothing."""
+
+
 class Tracer:
     """One tape for all programs: shared operations are recorded once.
 
@@ -241,7 +245,7 @@ class Tracer:
             for label, value in values.items()
         }
 
-    def outputs(self, further: Further = lambda *_: None) -> Program:
+    def outputs(self, further: Further = nothing_further) -> Program:
         """Return the program of the wanted motions with their rates, and the tests of a solution:
         closure, redundant rows, branch.
 
@@ -265,7 +269,7 @@ class Tracer:
         v: Sequence[Scalar],
         a: Sequence[Scalar],
         tests: Mapping[int, Scalar],
-        further: Further = lambda *_: None,
+        further: Further = nothing_further,
     ) -> Program:
         out = {
             **tests,

@@ -28,9 +28,9 @@ from ...errors import SolveError
 from ...forces import Forces, Reaction
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Pose
-from ...program.llvm.compiler import available
 from ...program.llvm.executor import Executor, bind
-from ...program.llvm.jit import LlvmCode, make_loops_ready
+from ...program.llvm.jit import LlvmCode
+from ...program.llvm.machine_code import available
 from ...trajectory import Array, BodyMotion
 from ..compiled.request import slots_of
 from ..forces.equations import BodyStates
@@ -205,9 +205,7 @@ class StaticModel:
         names = [*self.equations.design, MULTIPLIERS]
         self._state = slots_of(vectors, names)
         self._tests = slots_of(vectors, (STEP, SIGNS, DETERMINANT))
-        if compiled := available():
-            make_loops_ready()
-        self._code = LlvmCode(self.equations.plan) if compiled else None
+        self._code = LlvmCode(self.equations.plan) if available() else None
         self._bound: dict[int, Executor] = {}
         # no walk changes the signs
         executor = self.executor(1)

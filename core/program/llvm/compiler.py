@@ -37,21 +37,6 @@ class Processor(NamedTuple):
     version: str
 
 
-def available() -> bool:
-    """Return whether llvmlite is installed and its library loads, or did when first needed."""
-    return importlib.util.find_spec("llvmlite") is not None and _loads()
-
-
-@cache
-def _loads() -> bool:
-    try:
-        # asks LLVM only without a cached answer
-        processor()
-    except (ImportError, OSError):  # `kincheck doctor` reports it
-        return False
-    return True
-
-
 @cache
 def llvm() -> Any:
     """Return LLVM's binding. Its import takes three times as long as loading a cached model; cached

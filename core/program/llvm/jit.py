@@ -6,12 +6,14 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import math
+import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, partial
 from pathlib import Path
-from threading import Lock, Thread
+from threading import Lock
 from typing import Any
 
 import msgspec
@@ -164,9 +166,16 @@ class LlvmCode:
         self._left -= groups  # an update lost between two threads only delays compilation
         if self._left <= 0:
             with self._lock:  # do not replace compiled code that other threads run
-                if self.interpreted:
-                    self._take(load(self._content, self._text))
-                    self.interpreted = False
+                if self.interpreted and self._left < math.inf:
+                    self._compile()
+
+    def _compile(self) -> None:
+        try:
+            self._take(load(self._content, self._text))
+            self.interpreted = False
+        except Exception as error:  # the interpreter gives the same bits, more slowly
+            self._left = math.inf
+            print(f"kincheck: note: a program stays interpreted: {error}", file=sys.stderr)
 
     def _interpret(self, tables: Mapping[str, Bytecode]) -> None:
         loop = _loop("interpret", self.width)
@@ -203,23 +212,10 @@ class LlvmCode:
         return "\n".join([*programs, declarations(self.width)])
 
 
-@cache
-def make_loops_ready() -> None:
-    """Compile the first loops in a thread, if not in the cache, during tracing: the compiler needs
-    no GIL.
-
-    Imports and file reads do need it: in a thread beside other Python code they take three times as
-    long.
-    """
-    width = compiler.vector_width()
-    missing = [
-        name
-        for name in ("interpret", "follow")
-        if not disk_cache.contains(cache_key(_content(name, width)))
-    ]
-    if missing:
-        compiler.llvm()
-        Thread(target=lambda: [_loop(name, width) for name in missing]).start()
+def load_loops() -> None:
+    """Load the loops of all plans, compiled where the cache has none."""
+    for name in LOOPS:
+        _loop(name, compiler.vector_width())
 
 
 def _loop(name: str, width: int) -> Code:

@@ -167,3 +167,44 @@ def test_compare_in_python_equals_command(tmp_path, old, new):
 def test_compare_in_python_refuses_invalid_arguments(old, new, given, said):
     with pytest.raises(kincheck.KincheckError, match=said):
         kincheck.compare(old, new, **given)
+
+
+def test_compare_of_cases_prints_directions(tmp_path, capsys):
+    """Of a case in millimetres: points in these, directions as they are; a point in metres."""
+    text = """schema = "kincheck-case/1"
+name = "NAME"
+source = "made up"
+units = { length = "mm" }
+[bodies.crank]
+[joints.axle]
+type = "revolute"
+bodies = ["ground", "crank"]
+point = POINT
+axis = AXIS
+[points.tip]
+body = "crank"
+position = [100.0, 0.0, 0.0]
+[drivers.turn]
+type = "joint_angle"
+joint = "axle"
+[sweep]
+driver = "turn"
+start = -0.4
+stop = 0.4
+steps = 4
+[outputs.x]
+type = "coordinate"
+point = "tip"
+direction = [1, 0, 0]
+"""
+    files = []
+    for name, point, axis in (("a", "[0, 0, 0]", "[0, 0, 1]"), ("b", "[5, 0, 0]", "[0, 0.6, 0.8]")):
+        file = tmp_path / f"{name}.toml"
+        file.write_text(text.replace("NAME", name).replace("POINT", point).replace("AXIS", axis))
+        files.append(str(file))
+    assert main(["compare", *files, "--json", str(tmp_path / "d.json")]) == 0
+    found = json.loads((tmp_path / "d.json").read_text())["run"]["comparison"]["points"]
+    assert {each["point"]: each["moved by [mm]"] for each in found} == {
+        "joints.axle.point": "5, 0, 0",
+        "joints.axle.axis": "0, 0.6, -0.2",
+    }

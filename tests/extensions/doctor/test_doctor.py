@@ -70,6 +70,21 @@ def test_doctor_names_missing_engine_remedy(without_imports, monkeypatch, capsys
     assert "not installed: pip install 'pin>=" in line
 
 
+@pytest.mark.parametrize(
+    ("version", "sound"), [("4", True), ("4.0.0rc1", True), ("10.1", True), ("3.10.2", False)]
+)
+def test_doctor_names_version_too_old(version, sound, without_imports, monkeypatch, capsys):
+    known = importlib.metadata.version
+    monkeypatch.setattr(
+        importlib.metadata,
+        "version",
+        lambda name: version if name == "mujoco" else known(name),
+    )
+    assert main(["doctor"]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("mujoco:")]
+    assert said == ([] if sound else ["mujoco: older than 4: pip install 'mujoco>=4'"])
+
+
 # Slow to import, and none takes part.
 OTHERS = (
     *("mujoco", "pinocchio", "exudyn", "pydrake", "dartpy", "opensim"),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from kincheck.adapters import engine
 from kincheck.core.case.io.case_file import case_text, load_case
-from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError

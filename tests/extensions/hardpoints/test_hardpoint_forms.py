@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from ...support.case_texts import complains, rows, write
@@ -228,3 +230,44 @@ def test_hardpoint_form_faults(tmp_path, name, form, old, new, message):
         pytest.importorskip("yaml")
     assert old in TEXTS[form]
     complains(write(tmp_path, TEXTS[form].replace(old, new, 1), name), message, SAID)
+
+
+CORNERS = {
+    "Achse;Seite": {"FL": "vorn;links", "FR": "vorn;rechts", "RL": "hinten;links"},
+    "ACHSE;SEITE": {"FL": "VA;L", "FR": "VA;R", "RL": "HA;L"},
+    "Ecke;Text": {"FL": "VL;a", "FR": "VR;a", "RL": "HL;a"},
+    "Rad;Text": {"FL": "vorne links;a", "FR": "vorne rechts;a", "RL": "hinten links;a"},
+}
+
+
+@pytest.mark.parametrize("heads", CORNERS)
+def test_german_corners_are_read(tmp_path, heads):
+    """As the English ones: `axle;side` with `front;left`."""
+    rows = ["# units: mm", "# axes: forward,left,up", f"{heads};Name;x;y;z"]
+    for k, cells in enumerate(CORNERS[heads].values()):
+        rows += [f"{cells};p{n};{n},5;{k},0;{n * n},0" for n in range(4)]
+    (file := tmp_path / "auto.csv").write_text("\n".join(rows))
+    for k, corner in enumerate(CORNERS[heads]):
+        found = read_hardpoints(file, Supplied(corner=corner))
+        assert [each.position for each in found.points.values()] == [
+            (n + 0.5, float(k), float(n * n)) for n in range(4)
+        ]
+        assert found.side == ("right" if corner == "FR" else "left")
+
+
+def test_names_of_comments_alone(tmp_path):
+    names = write(tmp_path, '# uca_front = "A"\n\n# uca_rear = "B"\n', "names.toml")
+    file = write(tmp_path, table().replace("uca_", "q_"), "car.csv")
+    with pytest.raises(CaseError, match=r"names\.toml: found no names, all lines are comments"):
+        load(file, replace(SAID, names=names, ask_names=True))
+
+
+def test_german_names_of_curves(tmp_path):
+    text = "Einfederung [mm];Vorspur [°];Sturz [°]\n" + "".join(
+        f"{z},0;0,1;{k},5\n" for k, z in enumerate((-20, -10, 0, 10, 20))
+    )
+    case = load(write(tmp_path, table(), "car.csv"), SAID)
+    curve = write(tmp_path, text, "rig.csv")
+    found, notes = with_curve(case, curve, CurveOptions())
+    assert {*found.reference} == {"toe", "camber"}
+    assert "read stroke [mm], toe [deg, column 'Vorspur [°]'], camber" in notes[0]

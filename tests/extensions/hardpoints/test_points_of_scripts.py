@@ -4,8 +4,9 @@ import re
 
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load, read_hardpoints
+from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 POINTS = {

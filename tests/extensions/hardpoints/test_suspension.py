@@ -19,7 +19,6 @@ from kincheck.cases import (
 from kincheck.cases.jet import Jet
 from kincheck.core import Distance
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.case.io.outputs import with_slopes
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.extensions.hardpoints.suspension import (
     Axle,
@@ -29,6 +28,7 @@ from kincheck.core.extensions.hardpoints.suspension import (
     SuspensionOutput,
     Vehicle,
 )
+from kincheck.core.extensions.hardpoints.suspension_section import with_slopes
 from kincheck.core.harness.compare import deviations, output_series
 from kincheck.core.joints import Revolute
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point

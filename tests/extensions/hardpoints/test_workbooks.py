@@ -10,7 +10,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.reader_options import LEFT_OUT
+from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome

@@ -7,12 +7,13 @@ import sys
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import LEFT_OUT
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 from kincheck.core.extensions.exports import model_writer
 from kincheck.core.extensions.exports.command import writer_of
 from kincheck.core.extensions.same.undriven import undriven_file
+from kincheck.core.extensions.trees.reader import read_tree
 from scipy.spatial.transform import Rotation
 
 from ...support import case_texts
@@ -458,3 +459,53 @@ def test_start_or_drive_beyond_limits(write):
         " 0.75"
     )
     assert "beyond" not in " ".join(load(write(model("a", joints[:1])), DRIVE).assembly)
+
+
+@pytest.mark.parametrize("named", ["", ' name=""'])
+def test_components_without_names_are_read(write, named):
+    """As OpenSim 4.6 has them: one multiplier for the coupler, and joints that move."""
+    coupled = texts(independent_coordinate_names="qa", dependent_coordinate_name="qb") + tagged(
+        "coupled_coordinates_function", line(-2.0, 0.0)
+    )
+    pins = [
+        joint("PinJoint", "A", "", "a", coordinate("qa", 0.3)),
+        joint("PinJoint", "B", "", "b", coordinate("qb", 0.3)),
+    ]
+    text = model("ab", pins, tagged("CoordinateCouplerConstraint", coupled))
+    text = re.sub(r'(<PinJoint) name="."', rf"\1{named}", text)
+    text = text.replace("<CoordinateCouplerConstraint", f"<CoordinateCouplerConstraint{named}")
+    case = load(write(text), driven("qa:0.3:0.5:3"))
+    assert since_design(case, solution(case), "qb") == pytest.approx([0.0, -0.2, -0.4], abs=EXACT)
+
+
+@pytest.mark.parametrize("inside", ["locked", "prescribed"])
+def test_prescribed_constant_is_its_value(write, inside):
+    function = "<prescribed_function><Constant><value>0.4</value></Constant></prescribed_function>"
+    still = {
+        "locked": coordinate("q2", 0.4, "<locked>true</locked>"),
+        "prescribed": coordinate("q2", 0.1, f"{function}<prescribed>true</prescribed>"),
+    }
+    pins = [
+        joint("PinJoint", "A", "", "a", coordinate("q1")),
+        joint("PinJoint", "B", "a", "b", still[inside], p=[(1, 0, 0)], c=[(-1, 0, 0)]),
+    ]
+    case = load(write(model("ab", pins)), driven("q1:0:0.5:3"))
+    there = solution(case).points["b"].position[0]
+    assert near(there[None], [[1 + math.cos(0.4), math.sin(0.4), 0.0]])
+
+
+def test_prescribed_motion_is_refused(write):
+    function = "<LinearFunction><coefficients>1 0</coefficients></LinearFunction>"
+    moved = f"<prescribed_function>{function}</prescribed_function><prescribed>true</prescribed>"
+    pin = joint("PinJoint", "A", "", "a", coordinate("q", 0.0, moved))
+    with pytest.raises(CaseError, match="prescribed by a LinearFunction of time"):
+        read_tree(write(model("a", [pin])))
+    read_tree(write(model("a", [pin.replace("<prescribed>true", "<prescribed>false")])))
+
+
+@pytest.mark.parametrize("around", ["Joint", "Constraint", "Body"])
+def test_unknown_component_of_set_is_refused(write, around):
+    text = FOUR_BAR.replace(f"</objects></{around}Set>", f"<Odd/></objects></{around}Set>")
+    assert text != FOUR_BAR
+    with pytest.raises(CaseError, match="<Odd>: unknown in <objects>"):
+        read_tree(write(text))

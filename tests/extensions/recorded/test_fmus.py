@@ -209,3 +209,16 @@ def test_fmu_without_description_is_refused(last_record, tmp_path, capsys):
     file.write_bytes(b"PK")
     assert last_record(case, "--fmu", file, jobs=None)[0] == 2
     assert "expected an FMU; export it anew" in capsys.readouterr().err
+
+
+def test_fmu_zip_bomb_is_refused(last_record, tmp_path, capsys):
+    case, file = tmp_path / "case.toml", tmp_path / "large.fmu"
+    case.write_text(CASE)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+        for k in range(3):
+            archive.writestr(f"resources/{k}", bytes(100_000_000))
+    assert file.stat().st_size < 400_000
+    assert last_record(case, "--fmu", file)[0] == 2
+    told = "unpacks to 300000022 bytes, expected 256000000 at most; export it without resources"
+    assert told in capsys.readouterr().err

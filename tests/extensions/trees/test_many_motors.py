@@ -4,9 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
 from kincheck.core.extensions.trees.assembly import assemble
 from kincheck.core.extensions.trees.driving import UndrivenMotions, read_start
+from kincheck.core.extensions.trees.reader import read_tree
 from kincheck.core.harness.compare import output_series
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.mechanism.motions import Table

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from kincheck.adapters.writers import mjcf, sdf
 from kincheck.core.algebra import vec
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
 from kincheck.core.extensions.exports.model_writer import written
+from kincheck.core.extensions.trees.reader import read_tree
 from kincheck.core.extensions.trees.tree import Mass, sum_of_masses
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.body import inertia_matrix
@@ -45,6 +46,7 @@ SETTINGS = {
     "bounds": '<compiler boundmass="3" boundinertia="4"/>',
     "no geoms": '<compiler inertiafromgeom="false" boundinertia="0.1"/>',
     "all groups": '<compiler inertiagrouprange="0 5"/>',
+    "<inertial> where no group": '<compiler inertiafromgeom="true" inertiagrouprange="1 2"/>',
 }
 
 

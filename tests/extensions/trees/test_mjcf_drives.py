@@ -7,7 +7,7 @@ import pytest
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 
-from ...support.case_texts import complains
+from ...support.case_texts import complains, write
 from ...support.model_files import COUPLING, DRIVEN, GRIPPER, SPRINGS, driven, edited
 
 DRIVES = {
@@ -109,3 +109,21 @@ def test_drive_and_hold_faults(kind):
 def test_drive_takes_angle_unit(drive):
     case = load(GRIPPER, replace(DRIVEN, drive=(f"right_driver_joint:{drive}",)))
     assert case.sweep.values[-1] - case.sweep.values[0] == pytest.approx(math.radians(20.0))
+
+
+CHAIN = """<mujoco><worldbody><body name="base"><joint name="ja" axis="0 0 1"/>
+<geom size="0.02"/><body name="upper" pos="0.5 0 0"><joint name="shoulder" type="ball"/>
+<geom size="0.02"/><body name="lower" pos="0.2 0 0"><joint name="elbow" type="ball"/>
+<geom size="0.02" pos="0.1 0 0"/></body></body></body></worldbody></mujoco>"""
+
+
+def test_hold_rest_holds_balls_of_rods(tmp_path):
+    """A link between two balls is a rod, unless both are held."""
+    file = write(tmp_path, CHAIN, "model.xml")
+    held = load(file, driven("ja:0:0.3:3", hold=("shoulder", "elbow")))
+    rest = load(file, driven("ja:0:0.3:3", hold_rest=True))
+    assert rest.mechanism == held.mechanism
+    assert any(
+        each.startswith("warning: held by --hold-rest, without a motor: shoulder, elbow")
+        for each in rest.assembly
+    )

@@ -5,7 +5,7 @@ it may.
 import numpy as np
 import pytest
 from kincheck.core.case.case import Truth
-from kincheck.core.case.io.reader_options import LEFT_OUT
+from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.exports.command import keep_texts

@@ -4,8 +4,9 @@ what is driven and held; rods; includes and replicates.
 
 import numpy as np
 import pytest
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
 from kincheck.core.extensions.trees.driving import read_start
+from kincheck.core.extensions.trees.reader import read_tree
 
 from ...support.case_texts import complains, refused
 from ...support.mjcf_models import agree, model, mujoco, stands_as

@@ -3,7 +3,8 @@ still.
 """
 
 import pytest
-from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 

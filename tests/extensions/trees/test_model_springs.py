@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import LEFT_OUT
+from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.mechanism.loads import SpringDamper, TorsionSpringDamper
 

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import LEFT_OUT
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
 from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
+from kincheck.core.extensions.trees.reader import read_tree
 
 from ...fuzz import sdf as seeds
 from ...support.case_texts import complains, refused, write
@@ -37,7 +38,7 @@ def test_link_under_two_joints_closes_loop(tmp_path):
     there = found.points["B"].position
     assert near(there, np.transpose(expected))
     assert {joint.name for joint in case.mechanism.joints} >= {"A", "B3", "C", "D"}
-    assert case.source.split(LEFT_OUT)[1] == "visual (1)"
+    assert case.source.split(LEFT_OUT)[1] == "visual (1), said of sdf (1)"
 
 
 def test_loop_joint_is_driven(tmp_path):

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from kincheck.core.algebra import X, Y, Z
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.io.reader_options import LEFT_OUT
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
 from kincheck.core.extensions.exports.command import writer_of
 from kincheck.core.extensions.exports.model_writer import written
 from kincheck.core.extensions.same.undriven import undriven_case, undriven_file
 from kincheck.core.extensions.same.verdict import compare
+from kincheck.core.extensions.trees.reader import read_tree
 from kincheck.core.joints import Polynomial, Revolute
 from kincheck.core.mechanism.mechanism import Body, Mechanism
 from kincheck.core.mechanism.motions import JointAngle

@@ -6,10 +6,11 @@ from functools import partial
 
 import numpy as np
 import pytest
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
 from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
 from kincheck.core.extensions.trees.driving import read_start
+from kincheck.core.extensions.trees.reader import read_tree
 
 from ...support.model_files import driven
 from ...support.model_poses import EXACT, coordinate, near, solution
@@ -193,9 +194,10 @@ MIMICS = {
     "mujoco on newton": (
         "MjcEqualityJointAPI",
         """rel newton:mimicJoint = </r/A>
+        float newton:mimicCoef0 = 30
         float newton:mimicCoef1 = 2
         double mjc:coef2 = 1""",
-        lambda q: 2 * q + q**2,
+        lambda q: math.radians(30) + 2 * q + q**2,
     ),
 }
 
@@ -240,13 +242,13 @@ def test_mass_without_shape_has_no_moments(write):
     assert tree.unweighed == {"c"}
 
 
-def test_newton_mimic_of_slide_counts_degrees(write):
-    """A thread of 0.36 m in a turn: a thousandth of the stage's unit in a degree."""
-    lines = "rel newton:mimicJoint = </r/A>", "float newton:mimicCoef1 = 0.001"
+def test_newton_mimic_of_slide_counts_radians(write):
+    """A slope has no degrees: converters of URDF and MJCF write that of their coordinates."""
+    lines = "rel newton:mimicJoint = </r/A>", "float newton:mimicCoef1 = 0.25"
     nut = joint("Prismatic", "nut", "", "b", *lines, apis="NewtonMimicAPI")
     case = load(write(*ARM[:2], hinge("A", "", "a"), nut), DRIVE)
     shift = solution(case).points["b"].position[:, 1]
-    assert shift == pytest.approx(0.36 / math.tau * case.sweep.values, abs=EXACT)
+    assert shift == pytest.approx(0.25 * case.sweep.values, abs=EXACT)
 
 
 def test_drive_motors_limits_and_starts(write):

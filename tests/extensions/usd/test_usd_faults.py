@@ -6,8 +6,8 @@ import sys
 from functools import partial
 
 import pytest
-from kincheck.core.case.models.files import read_tree
 from kincheck.core.errors import CaseError, KincheckError
+from kincheck.core.extensions.trees.reader import read_tree
 
 from ...support.case_texts import refused
 from ...support.usd_texts import ARM, body, hinge, joint, prim, stage, write_stage

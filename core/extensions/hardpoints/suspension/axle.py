@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -37,6 +37,7 @@ class AxleOutput(SuspensionOutput):
 
     measure = "m"
     needs = ("wheel_radius",)
+    further: ClassVar[Mapping[str, tuple[Any, Any]]] = {}
     reads = ("wheel_center", "spin_marker", "wheel_contact")
 
     other: Vehicle = field(metadata=HIDDEN)

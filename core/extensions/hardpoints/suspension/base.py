@@ -12,14 +12,17 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from ....algebra import Scalar, Vec3, where_larger
 from ....case.case import HELD_BUT, PER_TRAVEL
-from ....case.quantity import HIDDEN, PoseQuantity, TypedQuantity
+from ....case.io.schema import one_of
+from ....case.quantity import HIDDEN, Derived, TypedQuantity
 from ....jet import Jet
 from ....mechanism.mechanism import Mechanism, Point
-from .corner import Corner, Vehicle
+from .corner import Corner, Side, Vehicle
+
+_SIDES: Any = Annotated[Side, one_of(Side)]
 
 
 @dataclass(frozen=True)
@@ -27,13 +30,12 @@ class SuspensionOutput(TypedQuantity):
     """A quantity of a wheel or an axle, judged, reported and compared like any other output.
 
     Attributes:
-        needs: vehicle attributes that are optional in general, but required here.
         reads: vehicle attributes with the names of the points it reads.
         nowhere: reason why it has no value at some poses; empty if it has one at all.
         atol, rtol: an error is accepted up to atol [unit] + rtol * range of the reference.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ()
+    further: ClassVar[Mapping[str, tuple[Any, Any]]] = {"side": (_SIDES | None, None)}
     reads: ClassVar[tuple[str, ...]]
     nowhere: ClassVar[str] = ""
     registry: ClassVar[dict[str, type[SuspensionOutput]]] = {}
@@ -78,6 +80,11 @@ class SuspensionOutput(TypedQuantity):
     def problem(self) -> str:
         """Reason why this wheel has no such output: found, expected, remedy. Otherwise empty."""
         return ""
+
+    @property
+    def side(self) -> str:
+        """Side of its wheel, or of the first wheel of its axle."""
+        return str(self.vehicle.side)
 
     @property
     def undefined(self) -> str:
@@ -182,7 +189,7 @@ def _larger(a: Scalar, b: Scalar) -> Scalar:
 
 
 @dataclass(frozen=True)
-class PerTravel(PoseQuantity):
+class PerTravel(Derived):
     """The derivative of an output by wheel travel (jounce): the upward displacement of the wheel
     centre relative to the vehicle's body.
 

@@ -21,37 +21,13 @@ from typing import TypeAlias
 
 from ....algebra import Scalar, Vec3, cross, is_array, vec
 from ....case.case import MARKER
+from ....case.quantity import Convention
 from ....jet import Jet, arctan2, choose, each, known, norm, sqrt
 from ....mechanism.mechanism import Mechanism, Vector
 
 # Distance from the wheel centre to the markers on the wheel carrier [m]: a rim's radius, so
 # directions keep all digits of positions.
 MARKER_DISTANCE = 0.25
-
-
-class Convention(StrEnum):
-    """Standard of the axes and signs of outputs. SAE J670 also allows z up; here its name means the
-    historical z down.
-    """
-
-    ISO_8855 = "iso8855"
-    SAE_J670 = "sae_j670"
-
-    @property
-    def words(self) -> str:
-        """Standard and its axes, in words."""
-        return (
-            "ISO 8855 (x forward, y left, z up)"
-            if self is Convention.ISO_8855
-            else "SAE J670 (x forward, y right, z down)"
-        )
-
-    @property
-    def up(self) -> int:
-        """Factor from an upward component to one along z, and from a leftward component to one
-        along y.
-        """
-        return 1 if self is Convention.ISO_8855 else -1
 
 
 class Side(StrEnum):

@@ -18,7 +18,7 @@ from ....case.case import Case, size
 from ....harness.compare import output_series
 from ....joints import Kind
 from ....kinematics import NativeSolver, PreparedDesigns, Variants, kinds, places
-from ....program.llvm.compiler import available
+from ....program.llvm.machine_code import available
 from ....trajectory import PointMotion, Trajectory
 from ...sweep.sweep import sweep_designs
 from ...sweep.variation import Coordinate, Law, Mode, Variation

@@ -1,6 +1,6 @@
 """OpenSim: models in its XML since version 4; older ones are brought up to date by its own library.
 
-Coordinates keep their names, and the pose is that of their default values. Custom joints turn and
+Coordinates keep their names, and their default values are the pose. Custom joints turn and
 slide by lines of their coordinates; other axes may follow by polynomials and splines. Angles of
 frames and of ball, gimbal and free joints are turns about x, y and z of the body, one after the
 other (OpenSim 4.6).
@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 from posixpath import join as joined
@@ -19,17 +20,17 @@ from posixpath import normpath
 from numpy.polynomial import Polynomial
 
 from ...algebra import IDENTITY, Quat, Vec3, X, Y, Z
-from ...case.io.case_file import LARGEST_FILE
 from ...case.io.document import fault, read_text, shown
+from ...case.io.element import LEFT, TAKEN, ZEROS, Apart, Element, Names, parse_xml, words
+from ...case.io.readers import LARGEST_FILE
 from ...errors import KincheckError
 from ...extras import library
-from ...joints import PiecewisePolynomial, Spline
+from ...joints import PiecewisePolynomial
 from ...mechanism.loads import Law
-from .element import ZEROS, Element, parse_xml, words
-from .graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
-from .masses import mass_in
-from .place import ORIGIN, Place, turn_about, unit_quaternion
-from .tree import (
+from ..trees.graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
+from ..trees.masses import mass_in
+from ..trees.place import ORIGIN, Place, turn_about, unit_quaternion
+from ..trees.tree import (
     NO_LIMIT,
     BushingLaw,
     Closure,
@@ -40,8 +41,8 @@ from .tree import (
     Spring,
     Strut,
     Tree,
-    require_spline,
 )
+from .curves import ZERO, curve_of, function, is_own, polynomial
 
 VERSION_4 = 40_000
 """Oldest version of documents that are read as they are."""
@@ -64,31 +65,48 @@ AXES = words("translation1 translation2 translation3 rotation1 rotation2 rotatio
 CONSTRAINTS = words(
     "PointConstraint WeldConstraint ConstantDistanceConstraint CoordinateCouplerConstraint"
 )
-FUNCTIONS = (
-    *words("Constant LinearFunction PolynomialFunction MultiplierFunction"),
-    *words("SimmSpline PiecewiseLinearFunction"),
+APART = Apart(
+    "OpenSim",
+    {
+        "": ("name",),
+        "Model": words(
+            "<credits> <publications> <length_units> <force_units> <assembly_accuracy>"
+            " <ModelVisualPreferences> <defaults> <visible> <gravity>"
+        ),
+        **dict.fromkeys(
+            (*(f"{each}Set" for each in words("Body Joint Constraint Force Marker Frame")),),
+            ("<groups>", "<defaults>"),
+        ),
+        **dict.fromkeys(
+            words("Body Ground PhysicalOffsetFrame"),
+            words(
+                "<FrameGeometry> <attached_geometry> <WrapObjectSet> <VisibleObject> <mass_center>"
+                " <appearance>"
+            ),
+        ),
+        **dict.fromkeys(("frames", "components", "objects"), ("<PhysicalOffsetFrame>",)),
+        "Coordinate": words(
+            "<motion_type> <default_speed_value> <range> <clamped> <prescribed_function>"
+            " <is_free_to_satisfy_constraints>"
+        ),
+        "Marker": ("<fixed>",),
+        "PointToPointSpring": ("<GeometryPath>",),
+        **dict.fromkeys(
+            words("BushingForce TwoFrameLinker WeldConstraint PointConstraint"), ("<GeometryPath>",)
+        ),
+        "TransformAxis": ("<coordinates>", "<axis>"),
+    },
+    components=("<PhysicalOffsetFrame>",),
+    extended=("Model",),
 )
-IN_JOINT = words(
-    "socket_parent_frame socket_child_frame coordinates frames components SpatialTransform reverse"
-)
-IN_COORDINATE = words(
-    "motion_type default_value default_speed_value range clamped locked prescribed_function"
-    " prescribed is_free_to_satisfy_constraints"
-)
-IN_FRAME = words("socket_parent translation orientation components FrameGeometry attached_geometry")
-IN_CONSTRAINT = (
-    *words("isEnforced socket_body_1 socket_body_2 location_body_1 location_body_2"),
-    *words("constant_distance socket_frame1 socket_frame2 frames components scale_factor"),
-    *words("coupled_coordinates_function independent_coordinate_names dependent_coordinate_name"),
-)
+"""Names of OpenSim without meaning for kinematics."""
+_NAMED = re.compile(r"\w*(?:Joint|Constraint|Body|Force|Spring|Actuator|Damper)")
 _INSIDE = ("objects", "components", "frames", "coordinates", "Model")
 _TIED = (*words("BodySet JointSet ConstraintSet ForceSet MarkerSet CoordinateSet FrameSet"),)
 GRAVITY = (0.0, -9.80665, 0.0)
 BY_RATES = "its turning damping is by the angular velocity, and in OpenSim by rates of angles"
 """Gravity unless given [m/s^2]."""
 DEEPEST_FRAME = 50
-ON_LINE = 1e-12
-"""Distance of points from a line, over the largest value, that rounding in doubles leaves."""
 
 
 def whole_osim(root: Element) -> Element:
@@ -129,7 +147,21 @@ def read_osim(root: Element) -> Tree:
     Raises:
         CaseError: an unknown joint, function or constraint, an unknown frame or coordinate.
     """
-    return _Reader(root).read()
+    root = _with_names(root)
+    return _Reader(root).read().settled(root, APART)
+
+
+def _with_names(root: Element) -> Element:
+    """Return a document whose components all have names: OpenSim takes those without one too."""
+    names = Names(each.attributes.get("name", "") for each in root.descendants())
+
+    def named(element: Element) -> Iterator[Element]:
+        if _NAMED.fullmatch(element.tag) and not element.attributes.get("name"):
+            own = {**element.attributes, "name": names.new(element.tag.lower())}
+            element = replace(element, attributes=own)
+        yield element
+
+    return root.rebuild(named)
 
 
 class _Reader:
@@ -163,7 +195,7 @@ class _Reader:
             raise units.fault(f"found {shown(units.text)}, expected meters; convert the model")
         for element in self._all("Body"):
             self._add_body(element)
-        every = [each for each in self.paths.values() if each.tag.endswith("Joint")]
+        every = [each.take() for each in self.paths.values() if each.tag.endswith("Joint")]
         coupled = {
             name
             for each in self._all("CoordinateCouplerConstraint")
@@ -174,11 +206,11 @@ class _Reader:
         join(graph, joints)
         for each in self.paths.values():
             if each.tag.endswith("Constraint"):
-                self._constrain(each)
+                self._constrain(each.take())
         graph.couplings += self.ties
         self._forces()
         for marker in self._all("Marker"):
-            link, place = self._frame(marker, "socket_parent_frame")
+            link, place = self._frame(marker.take(), "socket_parent_frame")
             at = place * Place(marker.child_vector("location"))
             name = marker.require("name")
             name += ".marker" * (name in graph.places)
@@ -187,14 +219,20 @@ class _Reader:
         tree.gravity = x, y, z
         for section in self.model.children:
             if section.tag.endswith("Set") and section.tag not in _TIED:
-                for each in section.findall("objects"):
-                    for other in each.children:
-                        tree.count(other.tag)
+                for each in section.take().children:
+                    for other in each.take().children:
+                        tree.leave(other, other.tag)
+            if section.tag == "components":
+                for other in section.take().children:
+                    if not other.marks & {TAKEN, LEFT}:
+                        tree.leave(other, other.tag)
         return graph.hang()
 
     def _name(self, around: Element, path: str) -> None:
         """Give the elements in another one their paths."""
         for child in around.children:
+            if child.tag in _INSIDE or child.tag in _TIED or child.tag == "Ground":
+                child.take()
             if child.tag in _INSIDE:
                 self._name(child, path)
             elif "name" in child.attributes or child.tag.endswith("Set"):
@@ -209,7 +247,7 @@ class _Reader:
         return (each for each in self.paths.values() if each.tag == tag)
 
     def _add_body(self, element: Element) -> None:
-        graph, name = self.graph, element.require("name")
+        graph, name = self.graph, element.take().require("name")
         if name in graph.places:
             raise element.repeated_name(name, "the bodies")
         graph.places[name], graph.elements[name] = ORIGIN, element
@@ -241,17 +279,18 @@ class _Reader:
             return self.graph.add_world(), ORIGIN
         if depth > DEEPEST_FRAME:
             raise frame.fault("hangs on itself by a ring of frames; correct socket_parent")
-        frame.require_children(IN_FRAME)
+        frame.take()
         link, place = self._frame(frame, "socket_parent", depth + 1)
         angles = frame.value("orientation", 3, ZEROS)
         return link, place * Place(frame.child_vector("translation"), _turn(angles))
 
     def _joint(self, element: Element, coupled: set[str]) -> FramedJoint | None:
-        """Return a joint; None of one that leaves its link free."""
+        """Return a joint; None if it leaves its link free."""
         graph, name = self.graph, element.require("name")
         if element.tag not in (*CHAINS, CUSTOM):
             raise element.unknown_name("type", element.tag, (*CHAINS, CUSTOM), "a joint")
-        element.require_children(IN_JOINT)
+        if _flag(element, "reverse"):
+            raise element.fault("reverse: is not read, expected false; exchange its frames")
         (a, f), (b, g) = (
             self._frame(element, f"socket_{each}_frame") for each in ("parent", "child")
         )
@@ -275,10 +314,10 @@ class _Reader:
             for around in element.findall("coordinates")
             for each in around.findall("Coordinate")
         ]
-        for each in given:
-            each.require_children(IN_COORDINATE)
-            if _flag(each, "prescribed"):
-                self.graph.tree.count("prescribed motions of coordinates")
+        for k, each in enumerate(given):
+            if not each.attributes.get("name"):
+                own = {**each.attributes, "name": f"{name}_coord_{k}"}
+                given[k] = replace(each, attributes=own)
         for k in range(len(given), count):
             named = {"name": f"{name}_coord_{k}"}
             given.append(Element(element.file, "Coordinate", named, element.line))
@@ -290,7 +329,7 @@ class _Reader:
         chain = CHAINS[element.tag]
         coordinates = self._coordinates(element, name, len(chain))
         whole = element.tag in ("BallJoint", "FreeJoint") and not any(
-            _flag(each, "locked") or each.require("name") in coupled for each in coordinates
+            _is_still(each) or each.require("name") in coupled for each in coordinates
         )
         if not whole:
             return [self._freedom(coordinates[k], kind, axis) for kind, axis, k in chain]
@@ -301,7 +340,22 @@ class _Reader:
         return [*slides, FramedFreedom(name, "ball", X, element, turn=turn)]
 
     def _default(self, coordinate: Element) -> float:
-        return coordinate.child_number("default_value", 0.0)
+        """Return the value of a coordinate in the pose; of a prescribed one, by its function.
+
+        Raises:
+            CaseError: the motion is no rest.
+        """
+        own = coordinate.child_number("default_value", 0.0)
+        if (motion := _prescribed(coordinate)) is None:
+            return own
+        first, *more = function(motion).powers
+        value, *slopes = first
+        if more or slopes:
+            raise coordinate.fault(
+                f"is prescribed by a {motion.tag} of time, expected a Constant: a model says no"
+                " time; say <prescribed>false</prescribed>, and how it moves by --drive"
+            )
+        return value
 
     def _freedom(self, coordinate: Element, kind: Kind, axis: Vec3) -> FramedFreedom:
         """Return the move of a coordinate; lock it if the file does."""
@@ -309,7 +363,7 @@ class _Reader:
         if name in self.values:
             raise coordinate.repeated_name(name, "the coordinates")
         self.values[name] = self._default(coordinate)
-        if _flag(coordinate, "locked"):
+        if _is_still(coordinate):
             self.ties.append(Coupling(f"{name}.lock", {name: 1.0}, {}, (0.0,), coordinate))
         clamped = _flag(coordinate, "clamped")
         limit = Limit(*coordinate.value("range", 2, ())) if clamped else NO_LIMIT
@@ -326,11 +380,11 @@ class _Reader:
         given = {each.require("name"): each for each in space.findall("TransformAxis")}
         curves: dict[str, tuple[str, PiecewisePolynomial]] = {}
         for each in AXES:
-            curves[each] = _curve(given[each], coordinates) if each in given else ("", _ZERO)
+            curves[each] = curve_of(given[each], coordinates) if each in given else ("", ZERO)
         leads = {
             coordinate: each
             for each in (*AXES[:3], *AXES[3:])
-            if (coordinate := curves[each][0]) and _is_own(curves[each][1])
+            if (coordinate := curves[each][0]) and is_own(curves[each][1])
         }
         used = {coordinate for coordinate, _ in curves.values()}
         for coordinate, own in coordinates.items():
@@ -348,7 +402,7 @@ class _Reader:
             if k == 3:  # a hinge of the coordinate, and one back
                 for free in [x for x in coordinates if x not in leads]:
                     freedoms.append(self._freedom(coordinates[free], "hinge", X))
-                    follow(f"{free}.back", "hinge", X, free, _polynomial(0.0, -1.0))
+                    follow(f"{free}.back", "hinge", X, free, polynomial(0.0, -1.0))
             coordinate, curve = curves[each]
             kind: Kind = "slide" if k < 3 else "hinge"
             axis = (X, Y, Z)[k % 3]
@@ -390,9 +444,8 @@ class _Reader:
                 f"is a {element.tag}, expected one of {', '.join(CONSTRAINTS)}; leave it out by"
                 f" --without {name}"
             )
-        element.require_children(IN_CONSTRAINT)
         if not _flag(element, "isEnforced", default=True):
-            graph.tree.count("constraints that are not enforced")
+            graph.tree.leave(element, "constraints that are not enforced")
             return
         if element.tag == "CoordinateCouplerConstraint":
             self._couple(name, element)
@@ -416,11 +469,11 @@ class _Reader:
                 raise element.unknown_name(f"{key}_coordinate", each, self.values, "a coordinate")
         scale = element.child_number("scale_factor", 1.0)
         around = element.child("coupled_coordinates_function")
-        functions = around.children if around else []
+        functions = [each.take() for each in around.children] if around else []
         if len(functions) != 1:
             raise element.fault("coupled_coordinates_function: expected one function; correct it")
         if len(leaders) == 1:
-            curve = _function(functions[0]).scaled(1.0, scale)
+            curve = function(functions[0]).scaled(1.0, scale)
             self._follow(name, follower, leaders[0], curve, element)
             return
         if functions[0].tag != "LinearFunction":
@@ -443,8 +496,8 @@ class _Reader:
         ]
         for each in forces:
             coordinate = each.child_text("coordinate")
-            if not _flag(each, "appliesForce", default=True):
-                tree.count("forces that are not applied")
+            if not _flag(each.take(), "appliesForce", default=True):
+                tree.leave(each, "forces that are not applied")
             elif each.tag == "SpringGeneralizedForce" and coordinate in self.values:
                 numbers = [
                     each.child_number(key, 0.0) for key in ("stiffness", "viscosity", "rest_length")
@@ -458,7 +511,7 @@ class _Reader:
             else:
                 if each.tag.endswith("CoordinateActuator"):
                     tree.add_motor(each.tag, {coordinate} & self.values.keys())
-                tree.count(each.tag)
+                tree.leave(each, each.tag)
 
     def _ends(
         self, element: Element, socket: str, point: str = ""
@@ -501,94 +554,32 @@ class _Reader:
         self.graph.struts.append(Strut(name, links, places, law, element, element.tag))
 
 
-def _polynomial(*coefficients: float) -> PiecewisePolynomial:
-    """Return a polynomial, the constant first, without zeros at its end."""
-    trimmed = Polynomial(coefficients).trim()
-    return PiecewisePolynomial((0.0,), (tuple(trimmed.coef.tolist()),))
-
-
-_ZERO = _polynomial(0.0)
-
-
-def _is_own(curve: PiecewisePolynomial) -> bool:
-    """Return whether a curve is a line of slope 1 or -1."""
-    powers = curve.powers[0]
-    return not curve.knots and len(powers) == 2 and abs(powers[1]) == 1.0
-
-
-def _curve(axis: Element, coordinates: Mapping[str, Element]) -> tuple[str, PiecewisePolynomial]:
-    """Return the coordinate of an axis of a custom joint, empty without one, and its curve."""
-    names = axis.child_text("coordinates").split()
-    around = axis.child("function")
-    functions = [
-        each for each in (around or axis).children if each.tag not in ("coordinates", "axis")
-    ]
-    if not functions and not names:
-        return "", _ZERO
-    if len(functions) != 1 or len(names) > 1:
-        raise axis.fault(
-            f"found {len(functions)} functions of {len(names)} coordinates, expected one of one;"
-            " correct it"
-        )
-    curve = _function(functions[0])
-    moves = len(curve.powers[0]) > 1
-    if not (moves and names):
-        if moves:
-            raise axis.fault("has no coordinate, expected one for its function; add it")
-        return "", curve
-    if names[0] not in coordinates:
-        raise axis.unknown_name("coordinates", names[0], coordinates, "a coordinate of the joint")
-    return names[0], curve
-
-
-def _function(element: Element) -> PiecewisePolynomial:
-    """Return a function of one coordinate."""
-    match element.tag:
-        case "Constant":
-            return _polynomial(element.child_number("value", 0.0))
-        case "LinearFunction":
-            return _polynomial(*element.value("coefficients", 2)[::-1])
-        case "PolynomialFunction":
-            count = len(element.child_text("coefficients").split())
-            return _polynomial(*element.value("coefficients", max(count, 1))[::-1])
-        case "MultiplierFunction":
-            scale = element.child_number("scale", 1.0)
-            around = element.child("function")
-            inner = [each for each in (around or element).children if each.tag != "scale"]
-            if len(inner) != 1:
-                raise element.fault(f"found {len(inner)} functions, expected one; correct it")
-            found = _function(inner[0]).scaled(1.0, scale)
-            return found if found.knots else _polynomial(*found.powers[0])
-        case "SimmSpline" | "PiecewiseLinearFunction":
-            return _table(element)
-        case _:
-            raise element.fault(
-                f"is a {element.tag}, a curve for which there is no joint, expected one of"
-                f" {', '.join(FUNCTIONS)}; fit a SimmSpline"
-            )
-
-
-def _table(element: Element) -> PiecewisePolynomial:
-    """Return the function through points, a line where they are on one."""
-    count = max(len(element.child_text("x").split()), 2)
-    x, y = (element.value(key, count) for key in "xy")
-    points = tuple(zip(x, y, strict=True))
-    require_spline(element, points)
-    slope = (y[-1] - y[0]) / (x[-1] - x[0])
-    off = max(abs(b - y[0] - slope * (a - x[0])) for a, b in points)
-    if off <= ON_LINE * max(map(abs, y)):
-        return _polynomial(y[0] - slope * x[0], slope)
-    if element.tag == "PiecewiseLinearFunction":
-        raise element.fault(
-            "has corners, where velocities jump, expected points on one line; give a SimmSpline"
-        )
-    return Spline("spline", ("driven", "driving"), points).function
-
-
 def _turn(angles: Sequence[float]) -> Quat:
     """Return the turns about x, y and z of the body, one after the other."""
     turns = (turn_about(axis, angle) for axis, angle in zip((X, Y, Z), angles, strict=True))
     return unit_quaternion(reduce(Quat.__mul__, turns, IDENTITY))
+
+
+def _prescribed(coordinate: Element) -> Element | None:
+    """Return the function of a prescribed coordinate; None of another one.
+
+    Raises:
+        CaseError: it has several.
+    """
+    around = coordinate.child("prescribed_function")
+    if around is None:
+        return None
+    if not _flag(coordinate, "prescribed") or not around.children:
+        around.leave()
+        return None
+    if len(around.children) > 1:
+        raise around.fault("found several functions, expected one; remove the others")
+    return around.children[0].take()
+
+
+def _is_still(coordinate: Element) -> bool:
+    """Return whether a coordinate keeps its value."""
+    return _flag(coordinate, "locked") or _prescribed(coordinate) is not None
 
 
 def _flag(element: Element, tag: str, *, default: bool = False) -> bool:

@@ -12,20 +12,18 @@ degrees.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import cast
 
-from ...algebra import X, Y, Z, cross, quat, vec
+from ...algebra import cross, quat, vec
+from ...case.io.element import LEFT, ZEROS, Apart, Element, words
 from ...errors import remedy, shortened, similar
 from ...mechanism.mechanism import Vector
-from .element import ZEROS, Element, words
-from .graph import FramedFreedom, FramedJoint, Graph, global_frames, join
-from .masses import COLLIDER, StageMasses
-from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
-from .robot_elements import mimic
-from .tree import (
+from ..trees.graph import FramedFreedom, FramedJoint, Graph, global_frames, join
+from ..trees.masses import COLLIDER, StageMasses
+from ..trees.place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
+from ..trees.robot_elements import mimic
+from ..trees.tree import (
     INFINITE,
     NO_LIMIT,
     UNKNOWNS,
@@ -36,17 +34,10 @@ from .tree import (
     Tree,
     limit_of,
 )
+from .freedoms import AXES, GENERIC, TYPES, bounds_of, equality, freedoms_of, short_names
 from .usd_stage import UNITS
 
-AXES = {"X": X, "Y": Y, "Z": Z}
-TYPES: Mapping[str, Kind | None] = {
-    "PhysicsRevoluteJoint": "hinge",
-    "PhysicsPrismaticJoint": "slide",
-    "PhysicsSphericalJoint": "ball",
-    "PhysicsFixedJoint": None,
-}
-"""Joints with the one move they leave."""
-GENERIC, ROD = "PhysicsJoint", "PhysicsDistanceJoint"
+ROD = "PhysicsDistanceJoint"
 BODY, DRIVE = "PhysicsRigidBodyAPI", "PhysicsDriveAPI"
 PHYSX_MIMIC, NEWTON_MIMIC = "PhysxMimicJointAPI", "NewtonMimicAPI"
 MUJOCO_MIMIC = "MjcEqualityJointAPI"
@@ -66,6 +57,26 @@ IN_BODY = words(
     " linearVelocity mass density centerOfMass diagonalInertia principalAxes collisionEnabled"
     " filteredPairs"
 )
+APART = (
+    *words("velocity angularVelocity startsAsleep simulationOwner filteredPairs approximation"),
+    *words("dynamicFriction staticFriction restitution filteredGroups invertFilteredGroups"),
+    *words("mergeGroup collisionEnabled maxForce targetVelocity type stiffness damping position"),
+    *words("targetPosition high low mass density centerOfMass diagonalInertia principalAxes"),
+    *words("axis lowerLimit upperLimit coneAngle0Limit coneAngle1Limit gravityDirection"),
+    *words("gravityMagnitude minDistance maxDistance breakForce breakTorque"),
+)
+"""Properties of UsdPhysics without meaning for kinematics, or for some prims with them."""
+PHYSICS = (*TYPES, GENERIC, ROD, "PhysicsScene", "PhysicsCollisionGroup")
+SCHEMAS = words(
+    "PhysicsRigidBodyAPI PhysicsMassAPI PhysicsCollisionAPI PhysicsMeshCollisionAPI"
+    " PhysicsMaterialAPI PhysicsArticulationRootAPI PhysicsFilteredPairsAPI PhysicsLimitAPI"
+    " PhysicsDriveAPI PhysicsJointStateAPI"
+)
+"""Types and schemas of UsdPhysics."""
+# Their schemas have names like those of UsdPhysics.
+_VENDORS = ("Physx", "Newton", "Mjc")
+_PLAIN = ("def", "Xform", "Scope")
+_OF_READER = words("name path apis matrix variants")
 # These name bodies that they do not join.
 _APART = words(
     "collection material proxyPrim skel isaac physics:filteredPairs physics:filteredGroups"
@@ -108,7 +119,7 @@ class _Reader:
         self.metre, self.kilogram = (root.number(each) for each in UNITS[:2])
         self.prims = {each.attributes["path"]: each for each in root.descendants()}
         bodies = [path for path, each in self.prims.items() if _is_body(each)]
-        self.names = _short_names(bodies)
+        self.names = short_names(bodies)
         self.joints: dict[str, FramedJoint] = {}
         self.rods: list[Closure] = []
         self.moves: dict[str, list[Move]] = {}
@@ -125,7 +136,7 @@ class _Reader:
         for path, name in self.names.items():
             self._add_body(name, self.prims[path])
         joints = [each for each in root.descendants() if each.tag in (*TYPES, GENERIC, ROD)]
-        self.joint_names = _short_names([each.attributes["path"] for each in joints])
+        self.joint_names = short_names([each.attributes["path"] for each in joints])
         self._require_apart()
         for element in joints:
             self._add_joint(element)
@@ -144,11 +155,47 @@ class _Reader:
         self._keyframes()
         for each in filter(None, (each.attributes["variants"] for each in root.descendants())):
             tree.notes.append(f"variants that are read: {each}")
-        return tree
+        if off := root.attributes["off"].split():
+            tree.notes.append(f"not active: {shortened(off, MOST_NAMED)}")
+        root.take(*UNITS, "said")
+        return tree.settled(root, Apart("USD", {"": self._unread()}))
+
+    def _unread(self) -> set[str]:
+        """Return the unread properties without meaning for kinematics; count prims, and
+        properties and schemas of other programs on bodies and joints.
+
+        Raises:
+            CaseError: a type, schema or property of UsdPhysics is unknown.
+        """
+        found, tree = set[str](), self.graph.tree
+        bodies, read = {*self.names}, {*self.joint_names}
+        for path, element in self.prims.items():
+            element.take(*_OF_READER)
+            if LEFT in element.marks:
+                continue
+            moves = path in bodies or path in read
+            if element.tag not in (*_PLAIN, *PHYSICS):
+                _require_of_physics(element, element.tag, PHYSICS)
+                if not moves:
+                    tree.count(element.tag)
+            for api in element.attributes["apis"].split():
+                name = api.partition(":")[0]
+                if name not in (*SCHEMAS, *FOLLOWS, *CLOSES):
+                    _require_of_physics(element, name, SCHEMAS)
+                    tree.left_out[name] += moves
+            for name in element.unasked:
+                last = name.rpartition("physics:")[2]
+                if last != name and last not in APART:
+                    known = {*IN_JOINT, *IN_BODY, *APART}
+                    raise element.unknown_attribute(name, sorted(known), "USD")
+                if last == name and ":" in name:
+                    tree.left_out[f"{name} of {element.tag}"] += moves
+                found.add(name)
+        tree.left_out = +tree.left_out
+        return found
 
     def _add_body(self, name: str, element: Element) -> None:
         graph, (place, _) = self.graph, self._frame(element)
-        _require_spelt(element, IN_BODY)
         graph.places[name], graph.elements[name] = place, element
         if element.flag("physics:kinematicEnabled", default=False):
             graph.fixed.add(name)
@@ -228,15 +275,15 @@ class _Reader:
 
     def _add_joint(self, element: Element) -> None:
         graph = self.graph
-        _require_spelt(element, IN_JOINT)
         if not element.flag("physics:jointEnabled", default=True):
+            element.leave()
             graph.tree.notes.append(f"{element} is switched off and joins nothing (jointEnabled)")
             return
         (first, f), (second, g) = self._end_of_joint(element, 0), self._end_of_joint(element, 1)
         element.require_two(first or "the world", second or "the world")
         links = first or graph.add_world(), second or graph.add_world()
         if {*links} <= graph.fixed:
-            graph.tree.count("joints of what stands still")
+            graph.tree.leave(element, "joints of what stands still")
             return
         for key in ("physics:breakForce", "physics:breakTorque"):
             given = element.attributes.get(key, "inf") != "inf"
@@ -400,16 +447,21 @@ class _Reader:
                 key = "mjc:target" if said.get("mjc:target") else "newton:mimicJoint"
                 lead, unit, other = self._leader(joint, key, angle=1.0)
                 # both coordinates count from the stage's pose
-                yield lead, [c * unit / other**k for k, c in enumerate(_equality(element))]
+                own = self._one_move(element, joint.name)
+                offset = self._unit(own.kind) / unit  # Newton's is in degrees
+                powers = enumerate(equality(element, offset))
+                yield lead, [c * unit / other**k for k, c in powers]
                 continue
             elif (
                 name == NEWTON_MIMIC
                 and MUJOCO_MIMIC not in apis
                 and element.flag("newton:mimicEnabled", default=True)
             ):
-                lead, unit, other = self._leader(joint, "newton:mimicJoint")
+                # a slope of coordinates in radians, and an offset in degrees
+                lead, unit, other = self._leader(joint, "newton:mimicJoint", angle=1.0)
                 factor = element.number("newton:mimicCoef1", 1.0) * unit / other
-                offset = element.number("newton:mimicCoef0", 0.0) * unit
+                follower = self._one_move(element, joint.name)
+                offset = element.number("newton:mimicCoef0", 0.0) * self._unit(follower.kind)
             else:
                 continue
             move = self._one_move(element, joint.name)
@@ -485,98 +537,13 @@ class _Reader:
             )
 
 
+def _require_of_physics(element: Element, name: str, known: Sequence[str]) -> None:
+    """Refuse a type or schema with almost a name of UsdPhysics."""
+    alike = similar(name, known, CLOSE)
+    if name.startswith("Physics") or (alike and not name.startswith(_VENDORS)):
+        raise element.fault(f"found {name}, which UsdPhysics does not have; {remedy(name, known)}")
+
+
 def _is_body(element: Element) -> bool:
     enabled = BODY in element.attributes["apis"].split()
     return enabled and element.flag("physics:rigidBodyEnabled", default=True)
-
-
-def _equality(element: Element) -> list[float]:
-    """Return the coefficients of an equality of MuJoCo; Newton's schema, on which it stands, may
-    give the first two.
-    """
-    found: list[float] = []
-    for k, default in enumerate((0.0, 1.0, 0.0, 0.0, 0.0)):
-        base = element.number(f"newton:mimicCoef{k}", default) if k < 2 else default
-        found.append(element.number(f"mjc:coef{k}", base))
-    return found
-
-
-def _short_names(paths: Sequence[str]) -> dict[str, str]:
-    """Return short names of paths: as many of their last parts as tell them apart."""
-    found: dict[str, str] = {}
-    parts = {path: path.strip("/").split("/") for path in paths}
-    length, left = 1, [*paths]
-    while left:
-        ends = {path: "/".join(parts[path][-length:]) for path in left}
-        counts = Counter(ends.values())
-        found |= {path: end for path, end in ends.items() if counts[end] == 1}
-        left = [path for path in left if path not in found]
-        length += 1
-    return {path: found[path] for path in paths}
-
-
-def _require_spelt(element: Element, known: Sequence[str]) -> None:
-    """Refuse misspelt properties of UsdPhysics, which has many of similar names."""
-    for key in element.attributes:
-        name = key.removeprefix("physics:")
-        if name != key and name not in known and similar(name, known, CLOSE):
-            raise element.fault(f"found the property {key!r}; {remedy(name, known)}")
-
-
-def freedoms_of(element: Element, name: str) -> list[FramedFreedom]:
-    """Return the moves that a joint leaves.
-
-    Raises:
-        CaseError: no joint leaves them, or limits make no sense.
-    """
-    if element.tag == GENERIC:
-        return _generic(element, name)
-    kind = TYPES[element.tag]
-    if kind is None:
-        return []
-    letter = element.choice("physics:axis", (*AXES,), "X")
-    key = {"hinge": "angular", "slide": "linear"}.get(kind, "")
-    return [FramedFreedom(name, kind, AXES[letter], element, key=key)]
-
-
-def bounds_of(key: str) -> tuple[str, str]:
-    """Return the names of the limits of a move."""
-    if key in ("angular", "linear"):
-        return "physics:lowerLimit", "physics:upperLimit"
-    return f"limit:{key}:physics:low", f"limit:{key}:physics:high"
-
-
-def _generic(element: Element, name: str) -> list[FramedFreedom]:
-    """Return the moves of a joint whose limits lock axes."""
-    apis = element.attributes["apis"].split()
-    found: list[FramedFreedom] = []
-    for prefix, kind in (("trans", "slide"), ("rot", "hinge")):
-        for letter, axis in AXES.items():
-            key = f"{prefix}{letter}"
-            low, high = bounds_of(key)
-            limited = f"PhysicsLimitAPI:{key}" in apis
-            if not limited and (low in element.attributes or high in element.attributes):
-                raise element.fault(
-                    f"limit:{key}: found without the schema PhysicsLimitAPI:{key}, so that programs"
-                    " do not read it alike; apply the schema, or remove the limit"
-                )
-            bounds = [element.attributes.get(each, "inf") for each in (low, high)]
-            if limited and "inf" not in bounds and "-inf" not in bounds:
-                least, most = element.number(low), element.number(high)
-                if least > most or least == most == 0.0:
-                    continue
-                if least == most:
-                    raise element.fault(
-                        f"{low}: found {least:g} for both limits, which lock the joint out of its"
-                        " frames, expected low above high for a lock; move the frame"
-                    )
-            found.append(FramedFreedom(f"{name}.{key}", cast("Kind", kind), axis, element, key=key))
-    if "PhysicsLimitAPI:distance" in apis:
-        raise element.fault(
-            "limits a distance, which acts at its ends alone; write a"
-            " PhysicsDistanceJoint, or leave it out by --without " + element.attributes["name"]
-        )
-    slides = [each for each in found if each.kind == "slide"]
-    if len(found) - len(slides) == 3:
-        found = [*slides, FramedFreedom(f"{name}.rot", "ball", X, element)]
-    return [replace(found[0], name=name)] if len(found) == 1 else found

@@ -1,8 +1,8 @@
 """Elements of an XML file of any origin: attributes, texts and lines, no entities, no
 document types, a bounded depth.
 
-A mistyped attribute or element would silently fall back to its default, so unknown ones are
-refused.
+Elements note the questions of their reader. `settle` refuses the rest, unless it means nothing for
+kinematics: a mistyped attribute or element would silently fall back to its default.
 """
 
 from __future__ import annotations
@@ -10,16 +10,18 @@ from __future__ import annotations
 import math
 import re
 import statistics
+import sys
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import cast
 from xml.parsers import expat
 
 from ...algebra import Vec3, vec
-from ...case.io.document import decimal, fault, shown, unknown_name, usable
 from ...errors import CaseError, remedy, similar
-from .place import unit_vector
+from .document import decimal, fault, shown, unknown_name, usable
+from .ledger import Asked
 
 # Elements are some ten deep; but bodies of MJCF are in the bodies that carry them.
 DEEPEST, DEEPEST_BODY = 200, 5_000
@@ -29,15 +31,29 @@ MOST_ELEMENTS = 200_000
 # Two words are alike if a typing error makes one of the other.
 ALIKE = 0.75
 ZEROS = (0.0, 0.0, 0.0)
+# Error of the length of a unit vector by the rounding of its components.
+_ROUND_OFF = 2.0 * sys.float_info.epsilon
 USD = "usd"
 """Tag of the root of a stage of USD, whose numbers are in single precision."""
-EXTENDED = ("robot", "link", "model", "world")
+EXTENDED = ("robot", "link", "model", "world", "sdf")
 """Elements in which programs put their own ones."""
+TAKEN, LEFT, TEXT = "taken", "left", "text"
+"""Marks of a read element, of one listed with all in it, and of a read text."""
 
 
 def words(text: str) -> tuple[str, ...]:
     """Return the words of a text, for tables of names."""
     return tuple(text.split())
+
+
+def unit_vector(numbers: Sequence[float]) -> Vec3:
+    """Return the direction of three numbers, length one; unchanged if they have it to the last
+    digit, so that a file keeps its own numbers. Not for zero.
+    """
+    length = math.hypot(*numbers)
+    if abs(length - 1.0) <= _ROUND_OFF:
+        return vec(numbers)
+    return vec([each / length for each in numbers])
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +64,7 @@ class Element:
         line: its first one.
         texts: parts of the text in it.
         words: its place in messages, if it is not its line.
+        marks: what is read of it: `TAKEN`, `LEFT`, `TEXT`, and each "<TAG>" that is asked for.
     """
 
     file: Path
@@ -57,11 +74,38 @@ class Element:
     children: list[Element] = field(default_factory=list["Element"])
     texts: list[str] = field(default_factory=list[str])
     words: str = ""
+    marks: set[str] = field(default_factory=set[str], repr=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.attributes, Asked):
+            object.__setattr__(self, "attributes", Asked(self.attributes))
 
     @property
     def text(self) -> str:
         """The text in the element, without its ends."""
+        self.marks.add(TEXT)
         return "".join(self.texts).strip()
+
+    @property
+    def asked(self) -> set[str]:
+        """The attributes with a question."""
+        return cast("Asked", self.attributes).asked
+
+    @property
+    def unasked(self) -> list[str]:
+        """The attributes without a question."""
+        return cast("Asked", self.attributes).unasked
+
+    def take(self, *attributes: str) -> Element:
+        """Mark the element, and attributes of it, as read; return it."""
+        self.marks.add(TAKEN)
+        self.asked.update(attributes)
+        return self
+
+    def leave(self) -> Element:
+        """Mark the element and all in it as listed; return it."""
+        self.marks.add(LEFT)
+        return self
 
     def __str__(self) -> str:
         name = self.attributes.get("name")
@@ -97,8 +141,9 @@ class Element:
         )
 
     def findall(self, *tags: str) -> Iterator[Element]:
-        """Yield the elements of these tags in it."""
-        return (child for child in self.children if child.tag in tags)
+        """Yield the elements of these tags in it, each of which is read then."""
+        self.marks.update(f"<{tag}>" for tag in tags)
+        return (child.take() for child in self.children if child.tag in tags)
 
     def child(self, tag: str) -> Element | None:
         """Return the element of a tag; None without one.
@@ -165,11 +210,7 @@ class Element:
             if name in known or name.startswith("xmlns:"):
                 continue
             if closed or similar(name, known, ALIKE):
-                raise self.fault(
-                    f"found the attribute {shown(name)}, which {format_name} does not have"
-                    " here;"
-                    f" {remedy(name, known)}"
-                )
+                raise self.unknown_attribute(name, known, format_name)
 
     def require_children(self, known: Sequence[str], *, closed: bool = False) -> None:
         """Refuse a mistyped element, which would silently be left out.
@@ -190,10 +231,22 @@ class Element:
                 if each.startswith(prefix + colon) and (colon or ":" not in each)
             ]
             mistyped = similar(name, alike, ALIKE)
-            if mistyped or (closed and not colon):
-                can_leave = self.tag in EXTENDED and not mistyped
-                leave = f" (--without {child.tag} leaves it out)" * can_leave
-                raise child.fault(f"unknown in <{self.tag}>{leave}; {remedy(name, alike)}")
+            if mistyped or (closed and not (colon and self.tag in EXTENDED)):
+                raise self.unknown_child(child, alike)
+
+    def unknown_child(self, child: Element, known: Sequence[str]) -> CaseError:
+        """Return the error of an unknown element in it."""
+        name = child.tag.rpartition(":")[2]
+        foreign = ":" in child.tag or (self.tag in EXTENDED and not similar(name, known, ALIKE))
+        leave = f" (--without {child.tag} leaves it out)" * foreign
+        return child.fault(f"unknown in <{self.tag}>{leave}; {remedy(name, known)}")
+
+    def unknown_attribute(self, name: str, known: Collection[str], format_name: str) -> CaseError:
+        """Return the error of an unknown attribute."""
+        return self.fault(
+            f"found the attribute {shown(name)}, which {format_name} does not have here;"
+            f" {remedy(name, known)}"
+        )
 
     def numbers(
         self, name: str, *counts: int, default: Sequence[float] | None = None
@@ -302,6 +355,95 @@ class Element:
     def flag(self, name: str, *, default: bool) -> bool:
         """Return an attribute that is true or false."""
         return self.choice(name, ("true", "false"), str(default).lower()) == "true"
+
+
+@dataclass(frozen=True)
+class Apart:
+    """The names of a format without meaning for kinematics.
+
+    Attributes:
+        format_name: for messages.
+        names: attributes, and tags of elements in pointed brackets, by the tag of the element they
+            are in, or by two tags, "equality joint"; those of "" are anywhere.
+        components: tags in pointed brackets whose elements are counted by name; others
+            are settings, of which a format has many.
+        extended: elements in which programs put their own attributes and elements, which are
+            counted.
+    """
+
+    format_name: str
+    names: Mapping[str, Collection[str]]
+    components: Collection[str] = ()
+    extended: Collection[str] = EXTENDED
+
+
+@dataclass(frozen=True)
+class Account:
+    """How many elements, attributes and texts of a file are read, and how many are left out.
+
+    Attributes:
+        left_out: of those left out, the ones to list, by name.
+    """
+
+    read: int
+    left: int
+    left_out: Counter[str]
+
+
+def settle(root: Element, apart: Apart) -> Account:
+    """Return the account of a document after its reading.
+
+    Raises:
+        CaseError: something in it is neither read, nor known to mean nothing for kinematics.
+    """
+    read, left, left_out = 1, 0, Counter[str]()
+    waiting = [("", root)]
+    while waiting:
+        around, element = waiting.pop()
+        own = apart.names.get(f"{around} {element.tag}") or apart.names.get(element.tag, ())
+        known = {*apart.names.get("", ()), *own}
+        extended = element.tag in apart.extended
+        unasked = element.unasked
+        read += len(element.attributes) - len(unasked)
+        left += len(unasked)
+        for name in unasked:
+            if name in known or name.partition(":")[0] == "xmlns":
+                continue
+            alike = sorted({*element.asked, *(each for each in known if each[0] != "<")})
+            if not extended or similar(name, alike, ALIKE):
+                raise element.unknown_attribute(name, alike, apart.format_name)
+            left_out[f"{name} of {element.tag}"] += 1
+        if "".join(element.texts).strip():
+            unread = TEXT not in element.marks
+            read, left = read + (not unread), left + unread
+            left_out["texts that have no meaning"] += unread
+        inside: list[tuple[str, Element]] = []
+        for child in element.children:
+            tag = f"<{child.tag}>"
+            if TAKEN in child.marks and LEFT not in child.marks:
+                inside.append((element.tag, child))
+                read += 1
+                continue
+            left += _size(child)
+            if LEFT in child.marks:
+                continue
+            asked = {each for each in element.marks if each[0] == "<"}
+            alike = sorted(each[1:-1] for each in {*known, *asked} if each[0] == "<")
+            foreign = extended and ":" in child.tag and not similar(child.tag, alike, ALIKE)
+            if tag not in known and not foreign:
+                raise element.unknown_child(child, alike)
+            if foreign or tag in apart.components:
+                left_out[child.tag] += 1
+        waiting += inside[::-1]
+    return Account(read, left, +left_out)
+
+
+def _size(element: Element) -> int:
+    """Return the number of elements, attributes and texts in an element, itself included."""
+    return sum(
+        1 + len(each.attributes) + bool("".join(each.texts).strip())
+        for each in (element, *element.descendants())
+    )
 
 
 def _numbers(counts: Sequence[int]) -> str:
@@ -438,8 +580,8 @@ def printed_digits(root: Element) -> int:
     """
     counts: list[int] = []
     for element in root.descendants():
-        texts = [element.attributes.get(name, "") for name in _PLACES]
-        texts += [element.text] * (element.tag in _TEXTS)
+        texts = [text for name, text in element.attributes.items() if name in _PLACES]
+        texts += ["".join(element.texts)] * (element.tag in _TEXTS)
         for found in map(_NUMBER.fullmatch, " ".join(texts).split()):
             if found and (count := len(found[1].replace(".", "").rstrip("0"))) >= _FEWEST:
                 counts.append(count)

@@ -11,14 +11,14 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from ...case.io.document import fault, require_file, shown
+from ...case.io.element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
 from ...errors import CaseError, remedy, shortened, similar
 from ...extras import library
-from .element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
 
 FLATTEN = "write all into one file: usdcat --flatten FILE -o flat.usda"
 UNITS = ("metersPerUnit", "kilogramsPerUnit", "upAxis")
@@ -62,6 +62,7 @@ def root_of_usd(file: Path) -> Element:
         root = Element(file, USD, attributes, 1, words="the stage")
         prims = _Prims(file, pxr)
         root.children.extend(prims.inside(stage.GetPseudoRoot(), 1))
+        cast("dict[str, str]", root.attributes)["off"] = " ".join(prims.off)
     except (pxr.Tf.ErrorException, UnicodeDecodeError) as error:
         raise _unreadable(file, error) from None
     finally:
@@ -140,16 +141,18 @@ class _Prims:
 
     Attributes:
         count: how many are read.
+        off: paths of others, which are not active.
     """
 
     def __init__(self, file: Path, pxr: Any) -> None:
-        self.file, self.count = file, 0
+        self.file, self.count, self.off = file, 0, list[str]()
         self.relationship, self.predicate = pxr.Usd.Relationship, pxr.Usd.TraverseInstanceProxies()
         self.time = pxr.Usd.TimeCode.EarliestTime()
         self.places = pxr.UsdGeom.XformCache(self.time)
 
     def inside(self, around: Any, depth: int) -> Iterator[Element]:
         """Yield the prims in another one: those that are defined, active and loaded."""
+        self.off += [str(x.GetPath()) for x in around.GetAllChildren() if not x.IsActive()]
         for prim in around.GetFilteredChildren(self.predicate):
             path = str(prim.GetPath())
             kind = str(prim.GetTypeName()) or "def"

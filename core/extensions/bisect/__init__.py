@@ -1,0 +1,10 @@
+"""kincheck bisect: the release behind a changed result, the changed term, and the right side."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(
+    __name__,
+    needs=["exports"],
+    commands={"bisect": "command:Bisect"},
+    schemas={"bisect": "results:Bisection"},
+)

@@ -1,0 +1,1 @@
+"""Scripts for a simulator's own numbers without kincheck, named after its engine."""

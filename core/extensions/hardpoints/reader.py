@@ -1,0 +1,202 @@
+"""Files with points of suspensions: what tells each kind, and its table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...case.io.readers import WORKBOOKS, Reader, ReaderOptions, text_of
+from .options import NOTHING, HardpointOptions, WheelOptions
+
+if TYPE_CHECKING:
+    from ...case.case import Case
+    from .table import HardpointTable
+
+
+@dataclass(frozen=True)
+class HardpointReader(Reader):
+    """A reader of hardpoints.
+
+    Attributes:
+        table: returns the table of a file, by its options.
+        claim: see `Reader.claims`.
+    """
+
+    options: type[ReaderOptions] = WheelOptions
+    table: Callable[[Path, WheelOptions], HardpointTable] = field(kw_only=True)
+    claim: Callable[[Path, str, WheelOptions], int] | None = None
+
+    def claims(self, file: Path, text: str, options: WheelOptions) -> int:
+        """Return how surely a file holds such points."""
+        return self.claim(file, text, options) if self.claim else 0
+
+    def read(self, file: Path, options: WheelOptions) -> Case:
+        """Return the case of the points of a file."""
+        from .read import case_of_hardpoints
+
+        return case_of_hardpoints(self.table(file, options), options)
+
+
+def is_table(file: Path, supplied: WheelOptions) -> bool:
+    """Return whether a file is a table of hardpoints."""
+    from ...case.models.files import reader_of
+
+    return isinstance(reader_of(file, supplied), HardpointReader)
+
+
+def read_hardpoints(file: Path, supplied: WheelOptions = NOTHING) -> HardpointTable:
+    """Read the table of hardpoints of a file.
+
+    Raises:
+        CaseError: the file is unreadable, or no table of hardpoints.
+    """
+    from ...case.io.document import fault
+    from ...case.models.files import reader_of
+
+    reader = reader_of(file, supplied)
+    if not isinstance(reader, HardpointReader):
+        raise fault(file, "", "is no table of hardpoints; give a table, such as car.csv")
+    return reader.table(file, supplied)
+
+
+def _chrono(file: Path, supplied: WheelOptions) -> HardpointTable:
+    from .programs import read_chrono
+
+    return read_chrono(file, text_of(file))
+
+
+def _is_chrono(file: Path, text: str, supplied: WheelOptions) -> int:
+    from .programs import is_chrono
+
+    if file.suffix.lower() != ".json" or _is_list(text):
+        return 0
+    return 3 * is_chrono(_tables(file, text) or {})
+
+
+def _tables(file: Path, text: str) -> Mapping[str, Any] | None:
+    """Return what a text of JSON holds by name; None of a case file."""
+    from ...case.io.document import parse
+    from .programs import without_comments
+
+    tables = parse(file, without_comments(text))
+    return None if "schema" in tables else tables
+
+
+def _adams(file: Path, supplied: WheelOptions) -> HardpointTable:
+    from .programs import read_adams
+
+    return read_adams(file, text_of(file, of_spreadsheet=True))
+
+
+def _is_adams(file: Path, text: str, supplied: WheelOptions) -> int:
+    return 3 * ("[HARDPOINT]" in text)
+
+
+def _assetto(file: Path, supplied: WheelOptions) -> HardpointTable:
+    from .programs import read_assetto
+
+    return read_assetto(file, text_of(file), supplied)
+
+
+def _is_assetto(file: Path, text: str, supplied: WheelOptions) -> int:
+    from ...case.io.document import fault
+    from .programs import is_assetto
+
+    if file.suffix.lower() != ".ini":
+        return 0
+    if not is_assetto(text):
+        raise fault(
+            file,
+            "",
+            "found an .ini file without points such as WBCAR_TOP_FRONT or STRUT_CAR; give the"
+            " suspensions.ini of Assetto Corsa",
+        )
+    return 1
+
+
+def _plain(file: Path, supplied: WheelOptions) -> HardpointTable:
+    from ...case.io.document import fault
+    from .rows import read_plain
+
+    text = text_of(file, of_spreadsheet=True)
+    if "[BAR]" in text:
+        raise fault(file, "", f"found a text with [BAR], which {TABLE.unread['.pm']}")
+    return read_plain(file, text, supplied)
+
+
+def _may_be_plain(file: Path, text: str, supplied: WheelOptions) -> int:
+    return bool(supplied.template) or file.suffix.lower() == ".txt"
+
+
+def _workbook(file: Path, supplied: WheelOptions) -> HardpointTable:
+    from .rows import read_spreadsheet
+
+    return read_spreadsheet(file, supplied)
+
+
+def _tree(file: Path, supplied: WheelOptions) -> HardpointTable:
+    from .tree import read_python, read_tree
+
+    read = read_python if file.suffix.lower() == ".py" else read_tree
+    return read(file, text_of(file), supplied)
+
+
+def _may_be_tree(file: Path, text: str, supplied: WheelOptions) -> int:
+    from .programs import without_comments
+    from .tree import has_points, json_tree, toml_tree
+
+    suffix = file.suffix.lower()
+    if suffix == ".toml":
+        return 2 * has_points(toml_tree(file, text))
+    if suffix != ".json":
+        return 0
+    if _is_list(text):
+        return 2
+    if _tables(file, text) is None:
+        return 0
+    return 2 * bool(supplied.template or has_points(json_tree(file, without_comments(text))))
+
+
+def _is_list(text: str) -> bool:
+    from .programs import without_comments
+
+    return without_comments(text).lstrip().startswith("[")
+
+
+CHRONO = HardpointReader(
+    "Project Chrono suspension",
+    HardpointOptions,
+    others=(".json",),
+    table=_chrono,
+    claim=_is_chrono,
+)
+ADAMS = HardpointReader(
+    "Adams/Car hardpoints",
+    HardpointOptions,
+    (".sub", ".tpl", ".asy", ".hpt"),
+    table=_adams,
+    claim=_is_adams,
+)
+ASSETTO = HardpointReader(
+    "Assetto Corsa suspension", others=(".ini",), table=_assetto, claim=_is_assetto
+)
+TABLE = HardpointReader(
+    "hardpoint table",
+    suffixes=(".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts"),
+    unread={
+        ".pm": "is a suspension of rFactor, whose bars have no names of points; write their ends"
+        " into a table, name,x,y,z, with --units m --axes left,up,rearward"
+    },
+    table=_plain,
+    claim=_may_be_plain,
+)
+TREE = HardpointReader(
+    "tree of hardpoints",
+    suffixes=(".yaml", ".yml", ".py"),
+    others=(".json", ".toml"),
+    table=_tree,
+    claim=_may_be_tree,
+)
+WORKBOOK = HardpointReader("workbook of hardpoints", suffixes=WORKBOOKS, table=_workbook)

@@ -1,0 +1,5 @@
+"""kincheck site: one static page over the results in a folder."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(__name__, needs=["bisect", "board"], commands={"site": "command:BuildSite"})

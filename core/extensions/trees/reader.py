@@ -1,0 +1,182 @@
+"""Models of links in files: what tells each format, and its tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...case.io.readers import WITHOUT, Reader, ReaderOptions, readers, text_of
+from .options import ModelOptions
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from ...case.case import Case
+    from ...case.io.element import Element
+    from .tree import Tree
+
+
+@dataclass(frozen=True)
+class TreeReader(Reader):
+    """A reader of models of links in one format.
+
+    Attributes:
+        tag: of the root element.
+    """
+
+    kind: str = "model"
+    options: type[ReaderOptions] = ModelOptions
+    tag: str = ""
+
+    def root(self, file: Path) -> Element:
+        """Return the root element of a file; a format that is no XML makes elements of it.
+
+        Raises:
+            CaseError: it is not well-formed.
+            KincheckError: a library is missing.
+        """
+        from ...case.io.element import parse_xml
+
+        return parse_xml(file, text_of(file))
+
+    def whole(self, root: Element) -> Element:
+        """Return a document with all that it includes."""
+        return root
+
+    def tree(self, root: Element) -> Tree:
+        """Return the tree of links of a whole document.
+
+        Raises:
+            CaseError: something in it makes no sense.
+        """
+        raise NotImplementedError
+
+    def read(self, file: Path, options: ModelOptions) -> Case:
+        """Return the case of a model, driven and held as the options say."""
+        from .case import case_of
+
+        tree = read_tree(file, options.without)
+        require_used(file, options.without, tree.without)
+        return case_of(tree, options)
+
+
+@dataclass(frozen=True)
+class _Mjcf(TreeReader):
+    def claims(self, file: Path, text: str, options: ModelOptions) -> int:
+        """Return how surely a text is XML, whose root says more."""
+        return 2 * text.lstrip().startswith("<")
+
+    def whole(self, root: Element) -> Element:
+        from .mjcf import whole_mjcf
+
+        return whole_mjcf(root)
+
+    def tree(self, root: Element) -> Tree:
+        from .mjcf import read_mjcf
+
+        return read_mjcf(root)
+
+
+@dataclass(frozen=True)
+class _Urdf(TreeReader):
+    def tree(self, root: Element) -> Tree:
+        from .urdf import read_urdf
+
+        return read_urdf(root)
+
+
+@dataclass(frozen=True)
+class _Sdf(TreeReader):
+    def whole(self, root: Element) -> Element:
+        from .sdf import whole_sdf
+
+        return whole_sdf(root)
+
+    def tree(self, root: Element) -> Tree:
+        from .sdf import read_sdf
+
+        return read_sdf(root)
+
+
+_WRITE = "cannot be read; write it out as MJCF, URDF, SDF or USD from the program that made it"
+_SHAPES = "holds shapes, which say nothing of joints; give the model that names it"
+_PROGRAMS = (".mo", ".slx", ".sldasm", ".iam", ".catproduct")
+_MESHES = (
+    *(".step", ".stp", ".stl", ".obj", ".dae", ".iges", ".igs", ".fbx", ".glb", ".gltf", ".wrl"),
+)
+MJCF = _Mjcf(
+    suffixes=(".xml", ".mjcf"),
+    unread={
+        ".mjb": "is compiled; give the MJCF that it is made of",
+        **dict.fromkeys(_PROGRAMS, _WRITE),
+        **dict.fromkeys(_MESHES, _SHAPES),
+    },
+    tag="mujoco",
+)
+URDF = _Urdf(
+    suffixes=(".urdf",),
+    unread={
+        ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
+        ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
+    },
+    tag="robot",
+)
+SDF = _Sdf(suffixes=(".sdf", ".world"), tag="sdf")
+
+
+def is_model(file: Path) -> bool:
+    """Return whether a file is a model of links."""
+    from ...case.models.files import reader_of
+
+    return isinstance(reader_of(file), TreeReader)
+
+
+def root_of(file: Path) -> Element:
+    """Return the root element of a model.
+
+    Raises:
+        CaseError: it is no model.
+        KincheckError: a library is missing.
+    """
+    suffix = file.suffix.lower()
+    return next((each for each in _formats() if suffix in each.suffixes), MJCF).root(file)
+
+
+def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
+    """Return the links of a model, in the format of its root.
+
+    Args:
+        without: elements to leave out, by tag, name or TAG/NAME; the tree has those it found.
+
+    Raises:
+        CaseError: it is no such model, or something in it makes no sense.
+    """
+    root = root_of(file)
+    reader = next((each for each in _formats() if each.tag == root.tag), MJCF)
+    omitted: list[tuple[str, Element]] = []
+    tree = reader.tree(reader.whole(root).without_named(without, omitted))
+    tree.without = {name for name, _ in omitted}
+    if omitted:
+        tree.notes.append(f"{WITHOUT}{', '.join(str(each) for _, each in omitted)}")
+    return tree
+
+
+def require_used(file: Path, without: Collection[str], used: Collection[str]) -> None:
+    """Refuse names of elements to leave out, of which a model has none.
+
+    Raises:
+        CaseError: there is one.
+    """
+    from ...case.io.document import unknown_name
+
+    for name in without:
+        if name not in used:
+            elements = [*root_of(file).descendants()]
+            known = {each.tag for each in elements}
+            known |= {each.attributes.get("name", each.tag) for each in elements}
+            raise unknown_name(file, "--without", name, known, "an element of the file")
+
+
+def _formats() -> list[TreeReader]:
+    return [each for each in readers() if isinstance(each, TreeReader)]

@@ -1,0 +1,5 @@
+"""Models in USD."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(__name__, needs=("trees",), readers={"usd": "reader:STAGE"})

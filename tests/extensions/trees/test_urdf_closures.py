@@ -1,0 +1,129 @@
+"""Loops of a URDF that files beside it, and names of its frames, close."""
+
+import re
+
+import pytest
+from kincheck.core.case.models.files import load
+from kincheck.core.errors import CaseError
+from kincheck.core.extensions.trees.reader import read_tree
+
+from ...support.model_files import driven
+from ...support.model_poses import coordinate, solution
+from ...support.urdf_texts import robot
+
+FOUR_LINKS = """<robot name="r"><link name="base"/><link name="crank"/><link name="coupler"/>
+<link name="rocker"/><joint name="A" type="continuous"><parent link="base"/><child link="crank"/>
+<axis xyz="0 0 1"/></joint>
+<joint name="B" type="continuous"><parent link="crank"/><child link="coupler"/>
+<origin xyz="0 0.2 0"/><axis xyz="0 0 1"/></joint>
+<joint name="D" type="continuous"><parent link="base"/><child link="rocker"/>
+<origin xyz="0.5 0 0"/><axis xyz="0 0 1"/></joint></robot>"""
+CLOSURE = """closures:
+- {link_a: coupler, link_b: rocker, point: [0.6, 0.3, 0.0], axis: [0, 0, 1]}
+independent: [A]
+dependent: [B, D]
+"""
+OF_LINKS = """pin_loops:
+- {name: C, parent: coupler, child: rocker, parent_xyz: [0.6, 0.1, 0], child_xyz: [0.1, 0.3, 0],
+   axis: [0, 0, 2]}
+"""
+BESIDE = {
+    "in the file of the robot": ("robot.yaml", CLOSURE),
+    "in its own file": ("loop_closures.yaml", CLOSURE),
+    "in the package": ("config/loop_closures.yml", CLOSURE),
+    "of links": ("robot.loop_closures.yaml", OF_LINKS),
+    "of links, a ball": (
+        "robot_loop_closures.yaml",
+        OF_LINKS.replace("pin", "ball").replace(",\n   axis: [0, 0, 2]", ""),
+    ),
+}
+
+
+@pytest.mark.parametrize("way", BESIDE)
+def test_closures_beside_urdf_close_loop(way, tmp_path):
+    """The turn of B is that of two circles that meet, solved apart."""
+    pytest.importorskip("yaml")
+    file = robot(tmp_path, FOUR_LINKS)
+    name, text = BESIDE[way]
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).write_text(text)
+    case = load(file, driven("A:0:0.5:3"))
+    assert f"with {name.rpartition('/')[2]}" in case.source
+    turned = coordinate(case, solution(case), "B")
+    assert turned == pytest.approx([0.0, -0.21837050332959212, -0.4317512663107136], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("closures:", "closure:", "found 'closure'"),
+        ("closures:", "extra_loops:", "extra_loops"),
+        ("link_a", "link_1", "link_1"),
+        ("coupler,", "couplr,", "did you mean 'coupler'?"),
+        ("[A]", "[E]", "independent: found 'E'"),
+        ("[0, 0, 1]", "[0, 0, 0]", "axis: found zero"),
+    ],
+)
+def test_unknown_name_in_closures_is_named(old, new, said, tmp_path):
+    pytest.importorskip("yaml")
+    file = robot(tmp_path, FOUR_LINKS)
+    (tmp_path / "loop_closures.yaml").write_text(CLOSURE.replace(old, new, 1))
+    with pytest.raises(CaseError, match=re.escape(said)):
+        load(file, driven("A:0:0.5:3"))
+
+
+def test_closures_of_others_are_noted(tmp_path):
+    pytest.importorskip("yaml")
+    file = robot(tmp_path, FOUR_LINKS)
+    other = CLOSURE.replace("coupler", "p").replace("rocker", "q")
+    (tmp_path / "loop_closures.yaml").write_text(other)
+    (tmp_path / "robot.yaml").write_text("controller: {p: 1}")
+    (tmp_path / "closed_loops.json").write_text("{}")
+    notes = load(file, driven("A:0:0.5:3", hold_rest=True)).assembly
+    assert "loop_closures.yaml beside it is of other links, and not read" in notes
+    assert "robot.yaml: not read: controller" in notes
+    assert any("closed_loops.json beside it may close loops" in each for each in notes)
+    assert any(each.startswith("warning: held by --hold-rest") for each in notes)
+
+
+FIVE_BAR = """<robot name="planar"><link name="base"/><link name="l"/><link name="l2"/>
+<link name="r"/><link name="r2"/><link name="closing_tip_1"/><link name="closing_tip_2"/>
+<joint name="m1" type="continuous"><parent link="base"/><child link="l"/><axis xyz="0 0 1"/></joint>
+<joint name="p1" type="continuous"><parent link="l"/><child link="l2"/><origin xyz="0 0.2 0"/>
+<axis xyz="0 0 1"/></joint>
+<joint name="m2" type="continuous"><parent link="base"/><child link="r"/><origin xyz="0.3 0 0"/>
+<axis xyz="0 0 1"/></joint>
+<joint name="p2" type="continuous"><parent link="r"/><child link="r2"/><origin xyz="0 0.2 0"/>
+<axis xyz="0 0 1"/></joint>
+<joint name="f1" type="fixed"><parent link="l2"/><child link="closing_tip_1"/>
+<origin xyz="0.15 0.2 0"/></joint>
+<joint name="f2" type="fixed"><parent link="r2"/><child link="closing_tip_2"/>
+<origin xyz="-0.15 0.2 0"/></joint></robot>"""
+
+
+def test_closing_frames_are_one_point(tmp_path):
+    """As onshape-to-robot names them; what --hold-rest holds is near the base."""
+    case = load(robot(tmp_path, FIVE_BAR), driven("m1:0:0.4:3", hold_rest=True))
+    assert [driver.name for driver in case.mechanism.drivers] == ["m1", "m2"]
+    found = solution(case)
+    for name, angles in {
+        "p1": [0.0, -0.29186540314305265, -0.5725761939938617],
+        "p2": [0.0, 0.11533378148300301, 0.25608668202885787],
+    }.items():
+        assert coordinate(case, found, name) == pytest.approx(angles, abs=1e-12)
+    assert "closing_tip_1 and closing_tip_2 are one point, as their names say" in case.assembly
+
+
+def test_closing_frame_alone_is_warning(tmp_path):
+    text = FIVE_BAR.replace("closing_tip_2", "closing_end_2")
+    notes = load(robot(tmp_path, text), driven("m1:0:0.4:3", hold_rest=True)).assembly
+    assert "warning: closing_tip_1 has no other end: that loop is open" in notes
+
+
+def test_closing_frames_tied_already(tmp_path):
+    """A constraint of the same links stays the only one."""
+    loop = '<constraint name="C" type="spherical"><parent link="l2"/><child link="r2"/>'
+    ends = '<parent_origin xyz="0.15 0.2 0"/><child_origin xyz="-0.15 0.2 0"/></constraint>'
+    text = FIVE_BAR.replace("</robot>", f"{loop}{ends}</robot>")
+    tree = read_tree(robot(tmp_path, text))
+    assert [each.name for each in tree.ties] == ["C"]

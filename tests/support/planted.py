@@ -1,0 +1,140 @@
+"""Whether everything that a result says is in every form of it.
+
+Each word and each number of a result is changed in turn, and every form is written again: the new
+word, or the new number to the digits that the form has, must stand there, and stood not before.
+"""
+
+from __future__ import annotations
+
+import base64
+import copy
+import dataclasses
+import enum
+import html
+import math
+import re
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+from jinja2 import UndefinedError
+
+MARK = "qvx7"
+"""A word that stands nowhere."""
+TIMES = 1.7
+"""What numbers are changed by: beyond the one digit of some tables."""
+DEGREE = math.degrees(1.0)
+UNITS = 1.0, 1e3, 1e-3, 1e2, 1e6, DEGREE, 1e3 * DEGREE, 1e-3 * DEGREE, 1e2 * DEGREE, 1.0 / DEGREE
+"""Of tables and pages: mm, deg, kN, %, deg/kN and the like, of numbers in SI."""
+NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+Path = tuple[Any, ...]
+Forms = Mapping[str, Callable[[Any], str]]
+
+
+def missing(
+    result: Any, forms: Forms, ours: Sequence[str] = (), of: str = ".*"
+) -> dict[str, list[str]]:
+    """Return the forms that do not say something, by its place in the result.
+
+    Args:
+        ours: keys that are no part of a place: names of cases and outputs.
+        of: pattern of the places that are looked at.
+    """
+    before = {name: Counter(NUMBER.findall(form(result))) for name, form in forms.items()}
+    found: dict[str, list[str]] = {}
+    for place, (path, value) in _places(result, ours).items():
+        if not re.fullmatch(of, place):
+            continue
+        new = f"{value} {MARK}" if isinstance(value, str) else _other(value)
+        changed = _changed(result, path, new)
+        for name, write in forms.items():
+            try:
+                text = write(changed)
+            except (ValueError, LookupError, UndefinedError):  # a name that the form looks up
+                continue
+            said = MARK in text if isinstance(value, str) else _appears(new, text, before[name])
+            if not said:
+                found.setdefault(place, []).append(name)
+    return found
+
+
+def text_of_page(page: str) -> str:
+    """Return a page as text, with the packed data of its figures."""
+    packed = re.findall(r">([A-Za-z0-9+/=]{200,})<", page)
+    data = [zlib.decompress(base64.b64decode(each)).decode() for each in packed]
+    return "\n".join([html.unescape(page), *data])
+
+
+def _places(result: Any, ours: Sequence[str]) -> dict[str, tuple[Path, Any]]:
+    """Return the first word or number of each place: without the places in lists, records apart."""
+    found: dict[str, tuple[Path, Any]] = {}
+    for path, names, value in _leaves(result):
+        place = ".".join(name for name in names if name not in ours)
+        found.setdefault(place, (path, value))
+    return found
+
+
+def _leaves(value: Any, path: Path = (), names: Path = ()) -> Iterator[tuple[Path, Path, Any]]:
+    if value is None or isinstance(value, enum.Enum | bool):
+        return
+    if isinstance(value, str | int | float):
+        yield path, names, value
+        return
+    for key, each in _parts(value).items():
+        said = () if isinstance(key, int) else (str(key),)
+        if isinstance(key, int) and hasattr(each, "engine"):
+            said = (f"<{each.engine}>",)
+        yield from _leaves(each, (*path, key), (*names, *said))
+
+
+def _parts(value: Any) -> dict[Any, Any]:
+    if isinstance(value, msgspec.Struct):
+        return msgspec.structs.asdict(value)
+    if dataclasses.is_dataclass(value):
+        return {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, np.ndarray):
+        return dict(enumerate(value.tolist()))
+    return dict(enumerate(value)) if isinstance(value, Sequence) else {}
+
+
+def _other(value: float) -> float:
+    new = type(value)(TIMES * value)
+    return new + 1 if new == value else new
+
+
+def _changed(value: Any, path: Path, new: Any) -> Any:
+    """Return a copy with one part changed."""
+    if not path:
+        return new
+    key, *rest = path
+    new = _changed(_parts(value)[key], tuple(rest), new)
+    if isinstance(value, msgspec.Struct):
+        return msgspec.structs.replace(value, **{key: new})
+    if dataclasses.is_dataclass(value):
+        value = copy.copy(value)
+        object.__setattr__(value, key, new)
+        return value
+    if isinstance(value, Mapping):
+        return {**value, key: new}
+    if isinstance(value, np.ndarray):
+        value = value.copy()
+        value[key] = new
+        return value
+    return type(value)([*value[:key], new, *value[key + 1 :]])
+
+
+def _appears(value: float, text: str, before: Counter[str]) -> bool:
+    fresh = Counter(NUMBER.findall(text)) - before
+    return any(_rounds(size * value, each) for each in fresh for size in UNITS)
+
+
+def _rounds(value: float, text: str) -> bool:
+    """Return whether a text is a number rounded to its digits, of either sign."""
+    digits, _, exponent = text.lower().partition("e")
+    last = 10.0 ** (int(exponent or 0) - len(digits.partition(".")[2]))
+    return float(text) != 0.0 and abs(abs(float(text)) - abs(value)) <= 0.51 * last
