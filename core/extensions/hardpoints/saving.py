@@ -44,31 +44,47 @@ def save_table(
             f"save {name!r}: expected a plain name that ends in .csv, of letters, digits, dots,"
             " dashes and blanks; give another"
         )
-    path = table.file.parent / name
+    return write_table(table, supplied, points, table.file.parent / name, f"save {name}")
+
+
+def write_table(
+    table: HardpointTable,
+    supplied: WheelOptions,
+    points: Sequence[Sequence[float]],
+    path: Path,
+    option: str,
+) -> Path:
+    """Write a table with other numbers to a new file, as `save_table` does.
+
+    Args:
+        option: what the user gave, for messages.
+
+    Raises:
+        KincheckError: the file exists, cannot be written, or would be read with other numbers.
+    """
     alone = replace(supplied, sheet=None, corner=None)  # the new file has one table
     tries = [*_texts_with_changes(table, points), _new_text(table, supplied, points)]
     for content, said in zip(tries, [*[supplied] * (len(tries) - 1), alone], strict=True):
-        _write(path, content)
+        _write(path, content, option)
         if _reads_back(path, said, supplied, table, points):
             return path
         path.unlink()
     raise KincheckError(
-        f"save {name}: the file would be read with other numbers; nothing was written: save the"
+        f"{option}: the file would be read with other numbers; nothing was written: save the"
         " table from the program that made it"
     )
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write(path: Path, content: bytes, option: str) -> None:
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
-    name = path.name
     try:
         with open(os.open(path, flags | getattr(os, "O_BINARY", 0), 0o644), "wb") as file:
             file.write(content)
     except FileExistsError:
-        raise KincheckError(f"save {name}: the file exists and stays; give another name") from None
+        raise KincheckError(f"{option}: the file exists and stays; give another name") from None
     except OSError as error:
         raise KincheckError(
-            f"save {name}: cannot be written ({error.strerror}); give another name, or start"
+            f"{option}: cannot be written ({error.strerror}); give another name, or start"
             " kincheck with a file in a folder that is writable"
         ) from None
 

@@ -1,0 +1,9 @@
+"""Designs from their curves: the least change of a table that reaches a target."""
+
+from ...doors import Extension
+
+EXTENSION = Extension(
+    __name__,
+    needs=["compare", "hardpoints", "sweep"],
+    commands={"tune": "tune_command:Tune"},
+)

@@ -1,0 +1,225 @@
+"""kincheck tune, against an own double wishbone and another optimiser."""
+
+import json
+
+import kincheck
+import msgspec
+import numpy as np
+import pytest
+from kincheck.core.cli.main import main
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES
+from kincheck.core.harness import run as running
+from kincheck.core.harness.record import Outcome
+from scipy.optimize import minimize
+
+DEG = np.pi / 180.0
+TRAVEL = np.linspace(-0.03, 0.03, 7)
+RODS = [
+    ("uca_front", "uca_outer"),
+    ("uca_rear", "uca_outer"),
+    ("lca_front", "lca_outer"),
+    ("lca_rear", "lca_outer"),
+    ("tierod_inner", "tierod_outer"),
+]
+SAMPLE = {name: np.array(place) for name, place in TEMPLATES["double_wishbone"].sample.items()}
+PLACES = ["tierod_inner y", "tierod_inner z", "tierod_outer z", "uca_outer z"]
+GOALS = ["toe = 0 +- 0.02 deg", "camber at 30mm = -1.15 +- 0.02 deg"]
+BOX = 0.015
+
+
+def turned(w, x):
+    """Turn vectors by a rotation vector (Rodrigues)."""
+    angle = np.linalg.norm(w)
+    if angle < 1e-14:
+        return x + np.cross(w, x)
+    k = w / angle
+    across = np.cross(k, x)
+    return x + np.sin(angle) * across + (1.0 - np.cos(angle)) * np.cross(k, across)
+
+
+def wheel(points, travel):
+    """Return toe and camber: six equations of the knuckle's pose by Newton's method."""
+    center = points["wheel_center"]
+
+    def rows(q):
+        found = []
+        for inner, outer in RODS:
+            now = center + q[:3] + turned(q[3:], points[outer] - center) - points[inner]
+            rest = points[outer] - points[inner]
+            found.append(now @ now - rest @ rest)
+        return np.array([*found, q[2] - travel])
+
+    q, step = np.zeros(6), 1e-7
+    for _ in range(30):
+        slopes = [(rows(q + step * e) - rows(q - step * e)) / (2.0 * step) for e in np.eye(6)]
+        change = np.linalg.solve(np.array(slopes).T, rows(q))
+        q = q - change
+        if np.abs(change).max() < 1e-13:
+            break
+    x, y, z = turned(q[3:], np.array([0.0, 1.0, 0.0]))
+    return np.arctan2(x, y), -np.arcsin(z)
+
+
+def moved(offsets, places=PLACES):
+    points = {name: place.copy() for name, place in SAMPLE.items()}
+    for place, offset in zip(places, offsets, strict=True):
+        name, axis = place.split()
+        points[name]["xyz".index(axis)] += offset
+    return points
+
+
+def beyond(u):
+    """Return the margins of all bands, over their half-widths; positive within."""
+    found = np.array([wheel(moved(u * BOX), z) for z in TRAVEL])
+    off = np.append(found[:, 0] / (0.02 * DEG), (found[-1, 1] + 1.15 * DEG) / (0.02 * DEG))
+    return np.concatenate([1.0 - off, 1.0 + off])
+
+
+def slopes_of(function, u, step=1e-4):
+    ways = step * np.eye(len(u))
+    return np.array([(function(u + e) - function(u - e)) / (2.0 * step) for e in ways]).T
+
+
+@pytest.fixture
+def car(tmp_path):
+    lines = [f"{name},{','.join(repr(float(1e3 * x)) for x in at)}" for name, at in SAMPLE.items()]
+    head = "# template: double_wishbone\n# units: mm\n# axes: forward,left,up\nname,x,y,z\n"
+    file = tmp_path / "car.csv"
+    file.write_text(head + "\n".join(lines) + "\n")
+    return file
+
+
+def tune(car, goals, *moves):
+    """Return the exit status, the JSON and the path of the new table."""
+    new, found = car.with_name("new.csv"), car.with_name("found.json")
+    words = [word for goal in goals for word in ("--goal", goal)]
+    words += [word for move in moves for word in ("--move", move)]
+    files = ["--travel", "30mm:7", "--out", str(new), "--json", str(found)]
+    status = main(["tune", str(car), *words, *files])
+    return status, json.loads(found.read_text()), new
+
+
+def test_tune_agrees_with_another_optimiser(car):
+    moves = "tierod_inner: y z +- 15mm", "tierod_outer, uca_outer: z +- 15 mm"
+    status, found, new = tune(car, GOALS, *moves)
+    assert status == 0
+    assert found["checked_by"] in ("mujoco", "pinocchio", "exudyn", None)
+    u = np.array([found["moves_m"][place] for place in PLACES]) / BOX
+    assert beyond(u).min() > -1e-6
+    ends = []
+    random = np.random.default_rng(5)
+    for start in [np.zeros(4), *random.uniform(-0.5, 0.5, (4, 4))]:
+        end = minimize(
+            lambda u: u @ u,
+            start,
+            jac=lambda u: 2.0 * u,
+            bounds=[(-1.0, 1.0)] * 4,
+            constraints={"type": "ineq", "fun": beyond, "jac": lambda u: slopes_of(beyond, u)},
+            options={"ftol": 1e-14, "maxiter": 200},
+        )
+        if beyond(end.x).min() > -1e-8:
+            ends.append(np.linalg.norm(end.x))
+    assert found["norm"] == pytest.approx(min(ends), abs=1e-6)
+    written = kincheck.curves(kincheck.load(new), ["tierod_inner z"], [[0.0]], ["toe"]).values[
+        "toe"
+    ]
+    assert np.abs(written).max() <= 0.05 * DEG  # over a travel of 50 mm
+    points = {each.name: np.array(each.position) for each in kincheck.load(new).hardpoints}
+    for name, place in moved(u * BOX).items():
+        assert points[name] == pytest.approx(place, abs=1e-11)
+
+
+def test_tune_multiplier_is_slope_of_norm(car):
+    move = "tierod_inner: y z +- 15 mm"
+    norms = [tune(car, [f"toe = 0 +- {x} deg"], move)[1] for x in ("0.02", "0.0201") if clear(car)]
+    slope = (norms[0]["norm"] - norms[1]["norm"]) / (0.0001 * DEG)
+    assert norms[0]["bands"][0]["multiplier"] == pytest.approx(slope, rel=0.02)
+
+
+def clear(car):
+    car.with_name("new.csv").unlink(missing_ok=True)
+    return True
+
+
+def test_tune_small_box_is_unreachable(car, capsys):
+    status, found, new = tune(car, GOALS[:1], "tierod_inner: z +- 15 mm")
+    assert status == 0
+    clear(car)
+    needed = abs(found["moves_m"]["tierod_inner z"])
+    status, found, new = tune(car, GOALS[:1], f"tierod_inner: z +- {0.9e3 * needed:.6f} mm")
+    assert (status, new.exists(), found["reached"], found["file"]) == (1, False, False, None)
+    assert "Forbidden by 'toe = 0 +- 0.02 deg'" in capsys.readouterr().out
+    scan = np.linspace(-0.9 * needed, 0.9 * needed, 41)
+    excess = [
+        max(abs(wheel(moved([z], ["tierod_inner z"]), t)[0]) for t in TRAVEL) / (0.02 * DEG) - 1.0
+        for z in scan
+    ]
+    assert found["bands"][0]["excess"] == pytest.approx(min(excess), abs=1e-3)
+    assert min(excess) > 0.0
+
+
+def test_tune_follows_measured_curve(car):
+    offset = [0.003, -0.004]
+    places = ["tierod_inner y", "tierod_inner z"]
+    curve = [(z, wheel(moved(offset, places), z)[0]) for z in TRAVEL]
+    rig = car.with_name("rig.csv")
+    rows = [f"{float(1e3 * z)!r},{float(toe / DEG)!r}" for z, toe in curve]
+    rig.write_text("stroke [mm],toe [deg]\n" + "\n".join(rows) + "\n")
+    status, found, _ = tune(car, [f"toe = {rig} +- 0.0001 deg"], "tierod_inner: y z +- 15 mm")
+    assert status == 0
+    assert found["norm"] <= np.linalg.norm(offset) / BOX
+    assert [found["moves_m"][each] for each in places] == pytest.approx(offset, abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("goal", "move", "message"),
+    [
+        ("to = 0 +- 1 deg", "tierod_inner: y +- 1 mm", "did you mean 'toe'?"),
+        ("toe = 0", "tierod_inner: y +- 1 mm", "expected an output, a value and a tolerance"),
+        ("toe = 0 +- 1 mm", "tierod_inner: y +- 1 mm", "found the unit 'mm'"),
+        ("toe = 0 +- -1 deg", "tierod_inner: y +- 1 mm", "expected a positive number"),
+        ("toe at 90mm = 0 +- 1 deg", "tierod_inner: y +- 1 mm", "lies beyond the travel"),
+        ("toe = no.csv +- 1 deg", "tierod_inner: y +- 1 mm", "neither a number nor a file"),
+        ("toe = 0 +- 1 deg", "tierod_iner: y +- 1 mm", "did you mean 'tierod_inner'?"),
+        ("toe = 0 +- 1 deg", "tierod_inner: y", "expected points, axes and a box"),
+        ("toe = 0 +- 1 deg", "tierod_inner: y y +- 1 mm", "is given twice"),
+        ("toe = 0 +- 1 deg", "tierod_inner: y +- 1 deg", "expected a positive length"),
+    ],
+)
+def test_tune_bad_text_is_refused(car, capsys, goal, move, message):
+    assert main(["tune", str(car), "--goal", goal, "--move", move]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_tune_contradicted_table_is_refused(car, monkeypatch, capsys):
+    pytest.importorskip("mujoco")
+    honest = running.run
+
+    def contradicting(cases, engines, **how):
+        found = honest(cases, engines, **how)
+        if engines[0].name == "native":
+            return found
+        fail = {"outcome": Outcome.FAIL, "message": "toe is off"}
+        records = [msgspec.structs.replace(each, **fail) for each in found.records]
+        return msgspec.structs.replace(found, records=records)
+
+    monkeypatch.setattr(running, "run", contradicting)
+    new = car.with_name("new.csv")
+    words = ["--goal", GOALS[0], "--move", "tierod_inner: +- 15 mm", "--out", str(new)]
+    assert main(["tune", str(car), *words]) == 2
+    assert "mujoco does not confirm the new table (fail: toe is off)" in capsys.readouterr().err
+    assert not new.exists()
+
+
+def test_tune_locked_travel_is_refused(car, capsys):
+    words = ["--goal", GOALS[0], "--move", "tierod_inner: y +- 1 mm", "--travel", "600mm:61"]
+    assert main(["tune", str(car), *words]) == 2
+    assert "does not reach its whole travel" in capsys.readouterr().err
+
+
+def test_tune_existing_file_stays(car, capsys):
+    words = ["--goal", GOALS[0], "--move", "tierod_inner: y +- 1 mm", "--out", str(car)]
+    before = car.read_text()
+    assert main(["tune", str(car), *words]) == 2
+    assert "the file exists and stays" in capsys.readouterr().err
+    assert car.read_text() == before
