@@ -6,15 +6,14 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import msgspec
 
 from ..case.io.outputs import DEFAULT_ATOL
 from ..harness.labels import UNMADE, motion_unit, number
-from ..harness.record import Deviation, Facts, Outcome, OutputSeries, Record
+from ..harness.record import Facts, Outcome, OutputSeries, Record
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, value_text
 from .findings import (
@@ -61,11 +60,11 @@ from .steps import (
 )
 from .store import Pair, Store
 from .subjects import Subject
+from .values import largest, largest_difference, quantities, same_samples, values_of
 
 PHASES = ("build", "first", "warm", "compare")
 NO_REASON = "no reason is given"
 
-Values: TypeAlias = Sequence[float | None]
 References: TypeAlias = Mapping[str, Mapping[str, OutputSeries]]
 """True values by case and output."""
 
@@ -231,8 +230,8 @@ def _alike(a: Record, b: Record) -> bool:
         and a.outputs.keys() == b.outputs.keys()
         and all(
             len(each.old) == len(each.new)
-            and _largest_difference(each.old, each.new) <= UNJUDGED * _largest(each.old)
-            for each in _quantities(a, b)
+            and largest_difference(each.old, each.new) <= UNJUDGED * largest(each.old)
+            for each in quantities(a, b)
         )
     )
 
@@ -356,70 +355,6 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
         yield Finding.of(Kind.LOST, now, f"no longer validated: judged against {why}")
 
 
-@dataclass(frozen=True)
-class _Quantity:
-    """A motion of an output in two records, with its values and deviations."""
-
-    output: str
-    motion: str
-    unit: str
-    old: Values
-    new: Values
-    judged: Deviation | None
-    was_judged: Deviation | None
-
-    @property
-    def word(self) -> str:
-        return f"{self.output} {motion_word(self.motion, self.unit)}"
-
-    @property
-    def place(self) -> dict[str, Any]:
-        return {"output": self.output, "motion": self.motion}
-
-
-def _quantities(now: Record, before: Record) -> Iterator[_Quantity]:
-    """Yield the motions of all earlier outputs."""
-    for output, old in before.outputs.items():
-        for motion in QUANTITIES:
-            yield _Quantity(
-                output,
-                motion,
-                old.unit,
-                values_of(old, motion),
-                values_of(now.outputs.get(output), motion),
-                getattr(now.errors.get(output), motion, None),
-                getattr(before.errors.get(output), motion, None),
-            )
-
-
-def values_of(series: OutputSeries | None, motion: str) -> Values:
-    """Return the values of a motion over the samples; empty without such a series."""
-    return getattr(series, motion, None) or ()
-
-
-def _largest_difference(a: Values, b: Values) -> float:
-    """Return the largest difference over the common samples."""
-    pairs = zip(a, b, strict=False)
-    return max((abs(x - y) for x, y in pairs if x is not None and y is not None), default=0.0)
-
-
-def _largest(values: Iterable[float | None]) -> float:
-    return max((abs(x) for x in values if x is not None), default=0.0)
-
-
-def same_samples(now: Record, before: Record) -> bool:
-    """Return whether all drivers have equal values, up to last digits of sines and splines that
-    differ between processors.
-    """
-    mine, other = now.driver, before.driver
-    return {name: len(each) for name, each in mine.items()} == {
-        name: len(each) for name, each in other.items()
-    } and all(
-        _largest_difference(values, other[name]) <= SAME_SAMPLE * _largest(values)
-        for name, values in mine.items()
-    )
-
-
 def _find_moved(now: Record, before: Record) -> Iterator[Finding]:
     """Yield the outputs with changed values or samples, which only this comparison shows if there
     is no reference.
@@ -430,14 +365,14 @@ def _find_moved(now: Record, before: Record) -> Iterator[Finding]:
         yield Finding.of(Kind.MOVED, now, "solved at other values of the drivers than before")
         return
     moved: set[str] = set()
-    for each in _quantities(now, before):
+    for each in quantities(now, before):
         if each.judged:  # largest distance of two values within the tolerance of one standard
             limit = 2.0 * each.judged.tolerance
         else:  # forces set no scale for lengths
             outputs = (other for other in before.outputs.values() if other.unit == each.unit)
-            scale = _largest(x for other in outputs for x in values_of(other, each.motion))
+            scale = largest(x for other in outputs for x in values_of(other, each.motion))
             limit = DEFAULT_ATOL + UNJUDGED * scale
-        off = _largest_difference(each.old, each.new)
+        off = largest_difference(each.old, each.new)
         if off > limit and each.output not in moved:
             moved.add(each.output)
             size = value_text(number(off), motion_unit(each.unit, each.motion))
@@ -480,8 +415,8 @@ def _references(record: Record, now: References, before: References) -> Iterator
         new = now.get(record.case, {}).get(output)
         for motion in QUANTITIES:
             was = values_of(old, motion)
-            off = _largest_difference(was, values_of(new, motion))
-            if off > SAME_SAMPLE * _largest(was):
+            off = largest_difference(was, values_of(new, motion))
+            if off > SAME_SAMPLE * largest(was):
                 message = (
                     f"{output} {motion_word(motion, old.unit)} differs by up to {number(off)}"
                     f" {motion_unit(old.unit, motion)} from its earlier values"
@@ -605,7 +540,7 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
     unsolved = {
         k for k in range(count) if all(k >= len(each) or each[k] is None for each in series)
     }
-    for each in _quantities(now, before):
+    for each in quantities(now, before):
         if each.was_judged is not None and each.judged is None:
             continue
         had = [k for k, value in enumerate(each.old) if value is not None]

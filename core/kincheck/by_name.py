@@ -21,8 +21,10 @@ check_engine = function("check_engine", CheckEngine)
 def offered(name: str) -> Any:
     """Return what an extension offers under a name; of a command, its function."""
     found: Any = offers("public")[name].load()
-    whole: Any = isinstance(found, type) and issubclass(found, Command)
-    return function(name, found) if whole else found
+    kind: object = found
+    if isinstance(kind, type) and issubclass(kind, Command):
+        found = function(name, found)
+    return found
 
 
 def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:

@@ -186,7 +186,7 @@ OF_KC = [
     (r".*\.(axis|at|rigid|wheel_load)", "terminal", "curves"),
     ("case", "csv", "the name of the file"),
     (r"loads\..*\.unit", "csv", "as over travel"),
-    (r"loads\..*\.not_computed\..*", "terminal page csv", "as over travel"),
+    (r".*\.not_computed\..*", "terminal page csv", "in one note, made beside it"),
 ]
 
 
