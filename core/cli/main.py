@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TextIO, TypeVar
 
-from ..doors import entry_points
 from ..errors import KincheckError
 from ..extras import THREADS
 from ..harness.interrupts import Terminated, listening, status_of, words_of
@@ -135,7 +134,7 @@ def registry() -> Registry:
 
     def engine(name: str, mode: str = "projection") -> Any:
         if name in others:
-            point = entry_points(class_loading.GROUP)[name]
+            point = class_loading.entry_points(class_loading.GROUP)[name]
             return class_loading.create_engine(name, point.load())
         return adapters.engine(name) if mode == "projection" else adapters.engine(name, mode)
 

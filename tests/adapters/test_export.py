@@ -176,7 +176,7 @@ def test_export_help_lists_formats(capsys):
     for command in ("export", "assemblies"):
         assert main.main([command, "--help"]) == 0
         said = " ".join(capsys.readouterr().out.split())
-        assert "mjcf (MuJoCo), exudyn (a Python script), urdf (Pinocchio), sdf (Drake) or" in said
+        assert "mjcf (MuJoCo), exudyn (a Python script), urdf (Pinocchio), sdf (Drake)" in said
 
 
 # Written models, read by their simulators alone: they close at the design and elsewhere, and move

@@ -8,9 +8,9 @@ import importlib
 import numpy as np
 import pytest
 from kincheck.core import Body, Mechanism, Point, Revolute
-from kincheck.core.case.models.files import read_tree
 from kincheck.core.extensions.exports.command import writer_of
 from kincheck.core.extensions.exports.model_writer import written
+from kincheck.core.extensions.trees.reader import read_tree
 from kincheck.core.extensions.trees.tree import sum_of_masses
 
 from ..support.engine_motion import motion_case

@@ -126,6 +126,7 @@ def test_hostile_name_in_junit(name):
         "failure",
         "error",
         "skipped",
+        "system-out",
     }
     if name.isprintable():
         assert root[0].get("name") == name

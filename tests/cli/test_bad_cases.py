@@ -60,10 +60,8 @@ def test_run_continues_beside_unreadable_case(kincheck_main, capsys, tmp_path, m
     assert kincheck_main("report --history history") == 1
     told = capsys.readouterr().out
     assert message.partition(":")[0].replace("_", r"\_") in told
-    assert told.startswith(
-        "## run 2: all 2 right, 1 case could not be read; nothing to compare with: no earlier"
-        " green run"
-    )
+    told = re.sub(r": \d slower, ", ": ", told)  # of sweeps of 0.05 ms, on a busy machine
+    assert told.startswith("## run 2 against run 1 (last green): 1 case could not be read")
     # and is one fault, however many engines were to solve it
     engines = [RIGHT, Fake("other")]
     assert kincheck_main("run crank --history history", engines=engines) == 0
@@ -95,7 +93,7 @@ def test_run_without_readable_case_is_stored(kincheck_main, capsys, tmp_path, mo
     assert "1 case could not be read: crank" in Path("cases.md").read_text()
     assert kincheck_main("report --history history") == 1
     assert capsys.readouterr().out.startswith(
-        "## run 3 against run 2 (last green): 1 case could not be read"
+        "## run 3: all 0 right, 1 case could not be read; nothing to compare with"
     )
 
 

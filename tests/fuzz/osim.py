@@ -1,11 +1,7 @@
 """Models of OpenSim; a coordinate named in the model is driven."""
 
-from kincheck.core.extensions.osim.osim import (
-    AXES,
-    CHAINS,
-    CONSTRAINTS,
-    FUNCTIONS,
-)
+from kincheck.core.extensions.osim.curves import FUNCTIONS
+from kincheck.core.extensions.osim.osim import AXES, CHAINS, CONSTRAINTS
 
 from .fuzzing import changing, reading
 from .keeping import seeds_in_file

@@ -9,9 +9,7 @@ from kincheck.adapters import engine
 from kincheck.core.case.case import Series
 from kincheck.core.case.closing import held_case
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.errors import CaseError
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
-from kincheck.core.extensions.sweep.study import Study
 from kincheck.core.harness.execution import Answer, Attempt, Failure, Pair, attempt
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
@@ -411,12 +409,6 @@ def test_missing_derivative_has_reason(tmp_path):
     assert "no derivative by stroke at 9 of 9 samples: another assembly" in found.message
     assert np.isnan(found.outputs["rc"].position).all()
     assert np.isfinite(found.outputs["toe"].position).all()
-
-
-def test_no_tolerance_study_of_held_derivatives(tmp_path):
-    case = case_of(tmp_path, SWEEPS["both"])
-    with pytest.raises(CaseError, match=r"rc, .* choose others by --output"):
-        Study(case, None, 10, 1)
 
 
 def test_waypoints_interpolate_smoothly():

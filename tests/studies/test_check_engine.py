@@ -146,7 +146,7 @@ def offered(monkeypatch):
         made = {
             name: EntryPoint(name, value, class_loading.GROUP) for name, value in points.items()
         }
-        monkeypatch.setattr(class_loading, "entry_points", lambda: made)
+        monkeypatch.setattr(class_loading, "entry_points", lambda group: made)
         monkeypatch.syspath_prepend(str(ROOT))
 
     return offer

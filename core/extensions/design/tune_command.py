@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from ...case.case import Case
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
 from ...errors import KincheckError, refuse
 from ...options import destination, json_file, option, options, whole
-from ...report.axis import number
 
 if TYPE_CHECKING:
     from .tune import Tuned
@@ -65,6 +63,8 @@ class Tune(OfCase):
             raise KincheckError(f"--out {self.out}: {what}; give a new name that ends in .csv")
         refuse(self.unwritable())
         case = registry.case_of(self)
+        from ...case.case import Case
+
         if isinstance(self.case, Case) or not case.hardpoints:
             raise KincheckError(
                 f"{case.name}: is no table of hardpoints; give a table, such as car.csv"
@@ -114,6 +114,8 @@ def _facts(found: Tuned, out: Path | None) -> dict[str, Any]:
 
 
 def _lines(found: Tuned) -> list[str]:
+    from ...report.axis import number
+
     norm = f"norm {found.move.norm:.6g}"
     counts = f"{found.rounds} rounds, {found.designs} designs"
     agree = f"{found.same_ends} of {len(found.ends)} starts end here; the search is local"

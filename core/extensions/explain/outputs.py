@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import msgspec
 import numpy as np
@@ -15,6 +15,7 @@ from ...case.quantity import still_jets
 from ...harness.compare import numbers as as_numbers
 from ...jet import Jet
 from ...joints import Kind
+from ...mechanism.motions import PointCoordinate
 from ...trajectory import Array
 from ..sweep.varied_places import Geometry, Variable
 from .conditioning import Conditioning, PoseConditioning
@@ -118,19 +119,41 @@ def sensitivities(case: Case, found: Conditioning, geometry: Geometry) -> list[S
     names = [each.name for each in case.outputs if not each.forces]
     if not moved or not names:
         return []
-    ready = DesignOutputs.of(without_forces(case), moved, slopes=names)
+    held = _shifted_drivers(case, moves)
+    ready = DesignOutputs.of(without_forces(case), moved, slopes=names, derivative=int(bool(held)))
     nominal = np.concatenate([geometry.values[name] for name in moved])[:, None]
     samples = [pose.sample for pose in found.poses]
     result: list[Sensitivity] = []
     solved = ready.solve(nominal)
     for name, slopes in solved.slopes(np.concatenate([moves[each] for each in moved])):
         own: list[Sensitivity] = []
-        for slope, (number, unit) in zip(slopes[:, samples, 0], numbers, strict=True):
-            if np.nanmax(np.abs(slope), initial=0.0) > NOTHING:
+        slopes = slopes[:, samples, 0]
+        for driver, shift in held.items():
+            alone = [*case.sweep.path.motions] == [driver]
+            rate = solved.values(name, 1)[samples, 0] / case.sweep.pace if alone else np.nan
+            slopes[shift != 0.0] += np.outer(
+                shift[shift != 0.0], np.broadcast_to(rate, len(samples))
+            )
+        for slope, (number, unit) in zip(slopes, numbers, strict=True):
+            if np.isfinite(slope).any() and np.nanmax(np.abs(slope), initial=0.0) > NOTHING:
                 by = f"{ready.outputs[name].unit}/{unit}"
                 own.append(Sensitivity(name, number, by, as_numbers(slope)))
         result += sorted(own, key=lambda each: -abs(each.largest))
     return result
+
+
+def _shifted_drivers(case: Case, moves: Mapping[str, Array]) -> dict[str, Array]:
+    """Return how far the numbers move each driver, from its design, whose value is an absolute
+    position of a point that varies: it is given, and the design is not.
+    """
+    found: dict[str, Array] = {}
+    for driver in case.mechanism.drivers:
+        if isinstance(driver, PointCoordinate) and not driver.relative:
+            direction = np.array(driver.direction) / np.linalg.norm(driver.direction)
+            place = moves.get(f"points.{driver.point}.position")
+            if place is not None and np.abs(direction @ place).any():
+                found[driver.name] = -(direction @ place)
+    return found
 
 
 def binding_numbers(found: Conditioning, variables: Sequence[Variable]) -> list[str]:

@@ -6,12 +6,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import kinematics
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.extensions.proofs import exact_forces
 from kincheck.core.extensions.proofs.ball_executor import precision
 from kincheck.core.extensions.proofs.exact import as_decimal, as_double
+from kincheck.core.extensions.proofs.krawczyk import Enclosure
 from kincheck.core.extensions.proofs.proofs import prove
 from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.joints import Revolute, Translational
@@ -42,7 +42,7 @@ def proved(mechanism: Mechanism, values=ANGLES, rate=RATE, reading=as_double):
     path = Path({driver.name: Ramp(rate)}, values / rate)
     found = prove(mechanism, path, ["tip"], drives, reading, BITS, 1e-12, names)
     for each in found.samples:
-        assert isinstance(each, kinematics.Enclosure), each
+        assert isinstance(each, Enclosure), each
     return found
 
 
@@ -169,7 +169,7 @@ def in_balls(made):
     names = [each.name for each in members]
     found = prove(made.mechanism, path, [], drives, as_double, BITS, 1e-12, names)
     for each in found.samples:
-        assert isinstance(each, kinematics.Enclosure), each
+        assert isinstance(each, Enclosure), each
     return zip(path.times, found.samples, strict=True)
 
 
