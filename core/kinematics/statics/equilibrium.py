@@ -145,8 +145,9 @@ class Equilibria:
             {name: Drive(c, 0.0, 0.0, *half) for name, (c, *half) in self.held.items()}
         )
         left_out = Cartesian(constraints_left_out(mechanism, equations.frame), formulation.bodies)
+        state = {name: [*values] for name, values in self.states.items()}
         rows = ForceEquations(
-            mechanism, formulation, formulation.configuration(self.states), self._at, {}, left_out
+            mechanism, formulation, formulation.configuration(state), self._at, {}, left_out
         )
         matrix, last = dense(rows.rows, formulation.unknowns, n), len(formulation.owners)
         found = Multipliers.of(
