@@ -79,7 +79,7 @@ def read_python(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hard
     if len(leaves) >= MOST_LINES:
         raise fault(file, "", f"found more than {MOST_LINES} values; give the points only")
     _require_unchanged(file, found)
-    facts = with_unit(file, facts_of_comments(text), units)
+    facts = with_unit(file, facts_of_comments(file, text), units)
     return table_of(file, "Python", [*leaves, *fact_leaves(facts)], supplied, left_out)
 
 

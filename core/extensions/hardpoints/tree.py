@@ -140,7 +140,7 @@ def toml_tree(file: Path, text: str) -> list[Leaf]:
     Raises:
         CaseError: not TOML.
     """
-    return [*leaves_of(parse(file, text)), *fact_leaves(facts_of_comments(text))]
+    return [*leaves_of(parse(file, text)), *fact_leaves(facts_of_comments(file, text))]
 
 
 def has_points(tree: Sequence[Leaf]) -> bool:
@@ -166,11 +166,29 @@ def fact_of(text: str) -> tuple[str, str] | None:
     return (found[1].lower(), found[2].strip()) if found else None
 
 
-def facts_of_comments(text: str) -> dict[str, str]:
-    """Return the facts in whole lines of comments; the first counts."""
-    comments = (line.strip() for line in text.splitlines() if line.lstrip().startswith("#"))
-    facts = [fact for comment in comments if (fact := fact_of(comment))]
-    return dict(reversed(facts))
+def add_fact(file: Path, where: str, facts: dict[str, str], fact: tuple[str, str]) -> None:
+    """Add a fact to those above.
+
+    Raises:
+        CaseError: another one stands there.
+    """
+    name, value = fact
+    if facts.setdefault(name, value).lower() != value.lower():
+        problem = f"found {name} {shown(value)}, and {shown(facts[name])} above, expected one"
+        raise fault(file, where, f"{problem}; remove either")
+
+
+def facts_of_comments(file: Path, text: str) -> dict[str, str]:
+    """Return the facts in whole lines of comments.
+
+    Raises:
+        CaseError: two contradict each other.
+    """
+    facts = dict[str, str]()
+    for k, line in enumerate(text.splitlines(), 1):
+        if line.lstrip().startswith("#") and (fact := fact_of(line.strip())):
+            add_fact(file, f"line {k}", facts, fact)
+    return facts
 
 
 def fact_leaves(facts: Mapping[str, str]) -> list[Leaf]:
@@ -205,7 +223,7 @@ def read_assignments(
         assigned = _ASSIGNED.fullmatch(line)
         if assigned is None:
             if fact := fact_of(line):
-                facts.setdefault(*fact)
+                add_fact(file, where, facts, fact)
             elif line.strip():
                 left_out.append(where)
             continue
