@@ -122,6 +122,7 @@ def imports_against_the_table(path, syntax):
             yield f"imports {where}"
         elif (
             here == target[0] == "adapters"
+            and not mine
             and len(path.parts) > 2
             and target[1] not in (path.parts[1], "shared")
         ):
