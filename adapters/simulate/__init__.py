@@ -11,7 +11,6 @@ EXTENSION = Extension(
         "pinocchio": "pinocchio_dynamics:Dynamics",
         "exudyn": "exudyn_solvers:trapezoidal",
         "exudyn-alpha": "exudyn_solvers:alpha",
-        "exudyn-static": "exudyn_statics:static",
         "exudyn-static-modified": "exudyn_solvers:modified",
     },
 )

@@ -18,10 +18,10 @@ from ...core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
 from ...core.trajectory import Array, Trajectory
 from ..exudyn.exudyn import Exudyn, Loads
 from ..exudyn.rows import System
-from ..shared.equilibrium import Rest, equilibria
 from ..shared.force_solution import elastic_force, elastic_forces, elastic_torque
 from ..shared.poses import frame_along
-from .exudyn_solvers import Coordinates, DriverTable, Solver
+from ..simulate.exudyn_solvers import Coordinates, DriverTable, Solver
+from .walk import Rest, equilibria
 
 # Tolerance of Newton on forces out of balance, as a part of the largest stiffness and load: the
 # round-off of positions of a metre, which stiffness turns into forces.
