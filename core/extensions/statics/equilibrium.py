@@ -26,16 +26,16 @@ from numpy.typing import NDArray
 from ...algebra import quat, vec
 from ...errors import SolveError
 from ...forces import Forces, Reaction
-from ...mechanism.mechanism import Mechanism
+from ...kinematics.compiled.request import slots_of
+from ...kinematics.forces.equations import BodyStates
+from ...kinematics.formulation.cartesian import COLUMNS
+from ...kinematics.formulation.state_vectors import columns_of, placed_bodies
+from ...mechanism.mechanism import Mechanism, Point
 from ...primitives.base import Pose
 from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode
 from ...program.llvm.machine_code import available
 from ...trajectory import Array, BodyMotion
-from ..compiled.request import slots_of
-from ..forces.equations import BodyStates
-from ..formulation.cartesian import COLUMNS
-from ..formulation.state_vectors import columns_of, placed_bodies
 from .equations import (
     BY,
     DETERMINANT,
@@ -47,7 +47,6 @@ from .equations import (
     REST,
     SIGNS,
     STEP,
-    LoadPoint,
     StaticEquations,
     motion_of,
     null_space,
@@ -196,7 +195,7 @@ class StaticModel:
     def __init__(
         self,
         mechanism: Mechanism,
-        loads: Sequence[LoadPoint] = (),
+        loads: Sequence[Point] = (),
         forces: Collection[str] = (),
     ) -> None:
         self.mechanism, self.equations = mechanism, StaticEquations(mechanism, loads, forces)
