@@ -42,6 +42,8 @@ class Extension:
         keys: docstring whose part behind "Reference. " lists the keys of a kind of file.
         completions: names that a shell offers as values of each option.
         engines: class of each engine in projection mode.
+        equilibria: function that returns the equilibria of a case by an engine, for engines
+            "native" and "projection"; see `harness.engine.Balancing`.
         simulations: function without arguments that returns each engine in simulate mode.
         readers: readers of files; see `case.io.readers.Reader`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
@@ -63,6 +65,7 @@ class Extension:
     keys: _Table = field(default_factory=dict[str, str])
     completions: _Table = field(default_factory=dict[str, str])
     engines: _Table = field(default_factory=dict[str, str])
+    equilibria: _Table = field(default_factory=dict[str, str])
     simulations: _Table = field(default_factory=dict[str, str])
     readers: _Table = field(default_factory=dict[str, str])
     methods: _Table = field(default_factory=dict[str, str])

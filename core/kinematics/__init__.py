@@ -6,7 +6,6 @@ Solve:
 
     solve              one design over a sweep
     solve_designs      many designs over a sweep, each with its own geometry
-    StaticModel        equilibria of a mechanism whose drivers are held, and its compliance
     forces_of          reactions of joints and efforts of drivers of a solved motion
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
@@ -37,7 +36,6 @@ The folders:
     structure        degrees of freedom, redundant rows, components, sparse factors
     compiled         one mechanism as compiled programs: request, programs, model, routes
     continuation     the walk along a path, singular poses, curves by arc length
-    statics          equilibria with springs, bushings and loads, and their compliance
     forces           the equations of forces, and the forces of a solved motion
     assembly         closed poses from estimates and random starts
 """
@@ -89,8 +87,6 @@ if TYPE_CHECKING:
         replay_motions,
         residuals,
     )
-    from .statics.equations import LoadPoint, with_free_coordinates
-    from .statics.equilibrium import Equilibria, StaticModel
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
 
@@ -118,8 +114,6 @@ _NAMES = {
         "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces"
         " replay_motions residuals"
     ),
-    "statics.equations": "LoadPoint with_free_coordinates",
-    "statics.equilibrium": "Equilibria StaticModel",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",
 }

@@ -12,6 +12,7 @@ from kincheck.core.joints import Cylindrical, Planar, Revolute, Screw, Translati
 from kincheck.core.joints.base import AxialJoint, triad
 from kincheck.core.kinematics import NativeSolver, Style, with_forces
 
+from ..support.by_night import sparse_by_day
 from ..support.driven_chains import COUPLINGS, SLOW, Link, chain, deviation, pushed_slide
 
 # Of the largest force or moment: some hundred operations, over a smallest singular value of 0.1,
@@ -59,7 +60,7 @@ def test_forces_of_driven_joint_between_bodies(kind, flipped, slow):
 
 @pytest.mark.parametrize("other_end", [False, True], ids=["", "driven from its other end"])
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-@pytest.mark.parametrize("name", COUPLINGS)
+@pytest.mark.parametrize("name", sparse_by_day(COUPLINGS, 3))
 def test_forces_of_coupled_joints(name, flipped, other_end):
     one, other, coupling = COUPLINGS[name]
     links = [HINGE, replace(one, flipped=flipped), replace(other, flipped=not flipped)]

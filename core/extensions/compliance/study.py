@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...case.case import HELD_BUT, TIME, Balance, Case, Load, Rig, Sweep, Truth
+from ...case.case import HELD_BUT, TIME, Balance, Case, Sweep, Truth
 from ...case.measures import DriverEffort, ForceMeasure
 from ...case.quantity import (
     ORDERS,
@@ -34,13 +34,15 @@ from ...case.quantity import (
 from ...errors import KincheckError, SolveError, number_of
 from ...harness.record import Results
 from ...jet import Jet
-from ...kinematics import Equilibria, StaticModel, solve
+from ...kinematics import solve
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Motion, Ramp
 from ...trajectory import Array, PointMotion
 from ..hardpoints.suspension import PerTravel
+from ..statics.equilibrium import Equilibria, StaticModel
 from .rates import SIDES, Curve, wheel_rates
 from .rig import CONTACT, PER, Wheel, held_drivers, wheels_of
+from .section import Load, rig_of
 
 # Engines agree on equilibria to round-off of their positions, which stiffness turns into forces.
 WITHIN, SAME_LOAD, ROUND_OFF = 1e-12, 1e-9, 1e-15
@@ -180,7 +182,7 @@ def _load_text(load: Load, value: float) -> str:
 
 class _Study:
     def __init__(self, case: Case, axle: AxleMotion) -> None:
-        self.case, self.axle, self.rig = case, axle, case.rig or Rig()
+        self.case, self.axle, self.rig = case, axle, rig_of(case)
         soft = case.mechanism.released()
         held = held_drivers(case, self.rig, soft)
         self.wheels = wheels_of(case, held, soft)

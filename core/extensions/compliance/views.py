@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ...case.case import Load
 from ...errors import number_of
 from ...harness.record import Record, Results
 from ...report.axis import ZERO
@@ -21,6 +20,7 @@ from ...report.sections import page as render
 from ...trajectory import Array
 from ...unit_text import with_unit
 from .rates import Curve
+from .section import Load
 from .study import MOST_SAID, WHEEL_LOAD, ComplianceCurves, ComplianceResults
 
 SCHEMA = "kincheck-compliance/1"

@@ -16,6 +16,7 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Driver, JointAngle, Path
 from ...primitives.base import GROUND_POSE, Drive, Pose
 from ...trajectory import Array
+from .cartesian import COLUMNS
 from .constraints import Frames
 from .formulation import Configuration, Rows, position_of
 from .relative import Formulation
@@ -157,3 +158,11 @@ def dense(rows: Rows, unknowns: int, n: int) -> Array:
         for column, value in row.items():
             found[:, k, column] = value
     return found
+
+
+def moved_most(columns: Mapping[str, int], motion: Array) -> tuple[str, Array]:
+    """Return the body moved most by a motion of the unknowns, and its part (dr, dpi)."""
+    name, first = max(
+        columns.items(), key=lambda each: float(np.linalg.norm(motion[each[1] : each[1] + COLUMNS]))
+    )
+    return name, motion[first : first + COLUMNS]

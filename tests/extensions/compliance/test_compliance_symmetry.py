@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core.case.case import Rig
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.compliance.section import Rig
 from kincheck.core.extensions.compliance.study import compliance
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.mechanism.loads import SpringDamper
@@ -60,7 +60,7 @@ def axle_of(folder, template, capsys, motion):
         for k in range(2)
     ]
     mechanism = replace(mechanism, forces=(*mechanism.forces, *springs))
-    return replace(case, mechanism=mechanism, rig=Rig(tire_stiffness=2e5))
+    return replace(case, mechanism=mechanism, tables={"compliance": Rig(tire_stiffness=2e5)})
 
 
 CHEAP = ("mcpherson", "five_link", "semi_trailing_arm")

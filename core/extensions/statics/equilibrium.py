@@ -26,18 +26,18 @@ from numpy.typing import NDArray
 from ...algebra import quat, vec
 from ...errors import SolveError
 from ...forces import Forces, Multipliers, Reaction, in_wrenches
-from ...mechanism.mechanism import Mechanism
+from ...kinematics.compiled.request import slots_of
+from ...kinematics.forces.equations import BodyStates, ForceEquations
+from ...kinematics.forces.reactions import free_wrench
+from ...kinematics.formulation.cartesian import COLUMNS, Cartesian
+from ...kinematics.formulation.constraints import constraints_left_out
+from ...kinematics.formulation.state_vectors import columns_of, dense, placed_bodies
+from ...mechanism.mechanism import Mechanism, Point
 from ...primitives.base import Drive, Pose
 from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode
 from ...program.llvm.machine_code import available
 from ...trajectory import Array, BodyMotion
-from ..compiled.request import slots_of
-from ..forces.equations import BodyStates, ForceEquations
-from ..forces.reactions import free_wrench
-from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import constraints_left_out
-from ..formulation.state_vectors import columns_of, dense, placed_bodies
 from .equations import (
     BY,
     DETERMINANT,
@@ -49,7 +49,6 @@ from .equations import (
     REST,
     SIGNS,
     STEP,
-    LoadPoint,
     StaticEquations,
     motion_of,
     null_space,
@@ -232,7 +231,7 @@ class StaticModel:
     def __init__(
         self,
         mechanism: Mechanism,
-        loads: Sequence[LoadPoint] = (),
+        loads: Sequence[Point] = (),
         forces: Collection[str] = (),
     ) -> None:
         self.mechanism, self.equations = mechanism, StaticEquations(mechanism, loads, forces)

@@ -16,7 +16,7 @@ equations. `rest` is the unbalance at design, taken away little by little.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from typing import Any
 
@@ -25,8 +25,18 @@ import numpy as np
 from ...algebra import ZERO, Scalar, cross, is_literal_zero, vec
 from ...errors import SolveError
 from ...joints import AxialJoint
+from ...kinematics.compiled.request import Layout
+from ...kinematics.compiled.traced_forces import angles
+from ...kinematics.forces.equations import BodyStates, ForceEquations
+from ...kinematics.forces.wanted import wanted_forces
+from ...kinematics.formulation.cartesian import Cartesian
+from ...kinematics.formulation.constraints import frames
+from ...kinematics.formulation.formulation import GROUND_ACCELERATION, Configuration
+from ...kinematics.formulation.state_vectors import jacobian as rows_at
+from ...kinematics.formulation.state_vectors import moved_most
+from ...kinematics.structure.redundancy import independent_rows
 from ...mechanism.loads import TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.mechanism import Mechanism, Point
 from ...mechanism.motions import Driver, JointAngle, JointDisplacement, JointDriver
 from ...primitives.base import Drive, Twist
 from ...program import (
@@ -41,15 +51,6 @@ from ...program import (
 from ...program.llvm.executor import Executor
 from ...program.tape import folded, jacobian
 from ...trajectory import Array
-from ..compiled.request import Layout
-from ..compiled.traced_forces import angles
-from ..forces.equations import BodyStates, ForceEquations
-from ..forces.wanted import wanted_forces
-from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import frames
-from ..formulation.formulation import GROUND_ACCELERATION, Configuration
-from ..formulation.state_vectors import jacobian as rows_at
-from ..structure.redundancy import independent_rows
 
 STEP, SIGNS, DETERMINANT = "step", "signs", "determinant"
 """Slots: the largest component of the step, and signs and size of the blocks' determinants."""
@@ -70,15 +71,6 @@ FORCE = "force of "
 FREE = 1e-11
 # A motion turns a body rather than moves it, if it turns by more than this per unit of length.
 TURNS = 1e-3
-
-
-@dataclass(frozen=True)
-class LoadPoint:
-    """A place of loads: a force at a point carried by a body, and a torque."""
-
-    name: str
-    body: str
-    position: Vector
 
 
 class StaticEquations:
@@ -107,7 +99,7 @@ class StaticEquations:
     def __init__(
         self,
         mechanism: Mechanism,
-        loads: Sequence[LoadPoint] = (),
+        loads: Sequence[Point] = (),
         forces: Collection[str] = (),
     ) -> None:
         self.wanted = wanted_forces(mechanism, forces)
@@ -374,14 +366,6 @@ def null_space(rows: Array, unknowns: int) -> Array:
     if not len(rows):
         return np.eye(unknowns)
     return np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
-
-
-def moved_most(columns: Mapping[str, int], motion: Array) -> tuple[str, Array]:
-    """Return the body moved most by a motion of the unknowns, and its part (dr, dpi)."""
-    name, first = max(
-        columns.items(), key=lambda each: float(np.linalg.norm(motion[each[1] : each[1] + COLUMNS]))
-    )
-    return name, motion[first : first + COLUMNS]
 
 
 def motion_of(columns: Mapping[str, int], motion: Array) -> str:
