@@ -38,8 +38,6 @@ from ..structure.components import Alike
 from ..structure.degrees_of_freedom import Selection
 from . import step_programs
 from .request import (
-    EARLIER,
-    FROM,
     LARGEST,
     LARGEST_OF_PARTS,
     MAX_ITERATIONS,
@@ -338,8 +336,6 @@ class Model(Tracing):
         executor.put(self.sampled, sample[:, None])
         executor.run(*self.plan.onward)
         executor.carry()
-        # there is no step behind it
-        executor.put([self.slots[EARLIER + TIME]], executor.get([self.slots[FROM + TIME]]))
 
     def design_lanes(self, geometry: Array) -> Array:
         """Return all slots of lanes at the design position of variants, shape (slots, variants).

@@ -106,8 +106,8 @@ PRESCRIBED = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
 """The vectors that tell how a prescribed body moves, and how many numbers each has [units and
 seconds].
 """
-FROM, EARLIER = "from ", "earlier "
-"""Before the names of what a lane is predicted from, and of what that was predicted from."""
+FROM = "from "
+"""Before the names of what a lane is predicted from."""
 PREDICTED = "predicted "
 """Before the names of the state that a lane was predicted to have."""
 BLOCKS = "", PREDICTED, FROM
@@ -242,7 +242,7 @@ def kept_motions(request: Request, state: Iterable[str]) -> list[str]:
         state: names of the vectors of the state.
     """
     order, names = request.order + 1, [*state]
-    found = [*names, *(PREDICTED + name for name in names), RATE, RATE_T] if request.state else []
+    found = [*names, RATE, RATE_T] if request.state else []
     found += names if request.slopes else []  # slopes begin at the solved poses
     found += [f"{label} {name}" for name in request.points for label in QUANTITIES[:order]]
     labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]
