@@ -37,7 +37,6 @@ from ...kinematics.formulation.acceptance_criteria import (
     slope_between,
 )
 from ...kinematics.formulation.constraints import measured
-from ...kinematics.formulation.relative import row_names
 from ...kinematics.formulation.state_vectors import turns
 from ...kinematics.structure.degrees_of_freedom import (
     NullSpaces,
@@ -271,7 +270,7 @@ class SparseLanes(Lanes):
     @property
     def _redundant(self) -> list[str]:
         """The rows left out, as "joint: primitive"."""
-        names = row_names(self.system.tracer.formulation)
+        names = self.system.tracer.formulation.row_names
         return [names[row] for row in self.rows.dropped]
 
     def begin(self) -> None:

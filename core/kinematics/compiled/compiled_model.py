@@ -34,6 +34,7 @@ from ...program.llvm.machine_code import available
 from ...trajectory import Array
 from ..formulation.constraints import Frames
 from ..formulation.state_vectors import samples
+from ..formulation.styles import MIXED, NATIVE
 from ..structure.components import Alike
 from ..structure.degrees_of_freedom import Selection
 from . import step_programs
@@ -99,7 +100,8 @@ def load_or_trace(mechanism: Mechanism, request: Request, alike: Alike | None = 
     """
     compiled = request.compiled and available()
     lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
-    if alike or request.varied or not (is_builtin(mechanism) and compiled):
+    own = is_builtin(mechanism) and request.style in (NATIVE, MIXED)
+    if alike or request.varied or not (own and compiled):
         return _trace(mechanism, request, alike, lanes)
     content = _source() + pickle.dumps((mechanism, request, lanes))
 

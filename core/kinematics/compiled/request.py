@@ -14,7 +14,7 @@ from ...jet import Jet
 from ...program import ITERATIONS, MARGIN, Program, Tape, program
 from ...trajectory import QUANTITIES
 from ..forces.wanted import WantedForces
-from ..formulation.constraints import Style
+from ..formulation.styles import NATIVE
 
 # Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16
 # times the condition), where sigma is at least `FIRM`; where it is less, from a residual below as
@@ -67,7 +67,7 @@ class Request:
         drivers: names of the moving drivers; the others hold their design value, and cost nothing.
         points, bodies: names of the points and bodies whose motion is wanted.
         order: 0 positions, 1 and velocities, 2 and accelerations.
-        style: form of the rows.
+        style: row style.
         compiled: run by machine code if llvmlite is installed, else by numpy; the results are the
             same to round-off.
         state: keep the whole state of every sample, and its rates.
@@ -84,7 +84,7 @@ class Request:
     points: tuple[str, ...]
     bodies: tuple[str, ...] = ()
     order: int = 2
-    style: Style = Style.NATIVE
+    style: str = NATIVE
     compiled: bool = True
     state: bool = False
     varied: tuple[str, ...] = ()
