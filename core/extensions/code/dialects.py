@@ -118,7 +118,6 @@ ACTION begin(LANE s) {
   sample(s, s[AT]);
   outputs(s);
   carry(s);
-  s[EARLIER] = s[HERE];
 }
 
 /* lane w to time t by as many steps as it takes, halved where one fails; n is for attempts */

@@ -23,13 +23,11 @@ from ...jet import Jet, arctan2, sqrt
 from ...joints.base import Kind
 from ...kinematics.compiled.compiled_model import ASSEMBLING, CLOSED, Model
 from ...kinematics.compiled.request import (
-    EARLIER,
     FROM,
     LARGEST_SIGMA,
     OUTPUT,
     RESTING,
     SIGMA,
-    TIME,
     accept_by,
 )
 from ...mechanism.motions import Absolute, Motion, Ramp, Sine
@@ -138,7 +136,7 @@ class SolvedCase:
         slots, plan = self.model.slots, self.model.plan
         named = {"RESIDUAL": "residual", "CLOSURE": "closure", "BRANCH": "branch"}
         named |= {"IS_DONE": DONE, "MARGIN": MARGIN, "SIGMA": FROM + SIGMA}
-        named |= {"LARGEST": FROM + LARGEST_SIGMA, "HERE": FROM + TIME, "EARLIER": EARLIER + TIME}
+        named |= {"LARGEST": FROM + LARGEST_SIGMA}
         sweep = self.case.sweep
         return {name: slots[slot] for name, slot in named.items()} | {
             "SIZE": self.size,
