@@ -119,7 +119,7 @@ class StaticEquations:
         for driver in mechanism.drivers:
             value, *half = self._vector(f"{DRIVE}{driver.name}", 3)
             self._drives[driver.name] = Drive(value, 0.0, 0.0, *half)
-        self._formulation = formulation = self._formulate(self._drives)
+        self._formulation = formulation = self.formulated(self._drives)
         self.design, self.columns = formulation.design, formulation.columns
         self._now = formulation.configuration(
             {name: self._vector(name, len(value)) for name, value in self.design.items()}
@@ -128,7 +128,8 @@ class StaticEquations:
         self.order = self.unknowns + len(self.chosen)
         self.plan = self._programs()
 
-    def _formulate(self, drives: Mapping[str, Drive]) -> Cartesian:
+    def formulated(self, drives: Mapping[str, Drive]) -> Cartesian:
+        """Return the formulation with the numbers of the held drivers."""
         return Cartesian.of(self.mechanism, self.frame, drives, named=angles(self.mechanism))
 
     def _vector(self, name: str, count: int) -> list[Any]:
@@ -143,7 +144,7 @@ class StaticEquations:
         Raises:
             SolveError: joints or other drivers hold the coordinate of a driver already.
         """
-        drivers, at_rest = self.mechanism.drivers, self._formulate({})
+        drivers, at_rest = self.mechanism.drivers, self.formulated({})
         matrix = rows_at(at_rest)
         first = len(matrix) - len(drivers)
         rank = len(independent_rows(matrix[:first], 0))

@@ -301,7 +301,7 @@ def test_asked_output_never_vanishes(tmp_path, capsys):
     (file := tmp_path / "asked.json").write_text(json.dumps(case))
     files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "csv", "out")]
     assert main(["kc", str(file), "--travel=10mm:3", "--axle=roll", *files]) == 0
-    printed, notes = capsys.readouterr()
+    printed, _ = capsys.readouterr()
     found = json.loads((tmp_path / "json").read_text())
     comment, heads = (tmp_path / "csv").read_text().splitlines()[:2]
     page = (tmp_path / "out" / "kc.html").read_text()
@@ -309,7 +309,7 @@ def test_asked_output_never_vanishes(tmp_path, capsys):
         name = output.name
         if name in MISSING:
             assert MISSING[name] in found["not_computed"][name]
-            for said in (notes, comment, page):
+            for said in (printed, comment, page):
                 assert f"not computed: {name}: " in said
         else:
             assert f"  {name}" in printed
