@@ -18,7 +18,7 @@ from ..harness.labels import (
     notes,
     suspects,
 )
-from ..harness.record import REFERENCE, Deviations, Outcome, Record, Results
+from ..harness.record import REFERENCE, Deviations, Facts, Outcome, Record, Results
 from ..history.findings import Kind, Regressions
 from ..history.store import Pair
 from ..unit_text import motion_word
@@ -56,7 +56,8 @@ def to_junit(results: Results) -> bytes:
                 warm = record.seconds.warm if record.seconds else None
                 for output, deviations in record.errors.items():
                     test = _test(suite, record.pair, output, warm or 0.0)
-                    verdict, message = _verdict(record, output, deviations)
+                    facts = results.run.get("cases", {}).get(case, {})
+                    verdict, message = _verdict(record, output, deviations, facts)
                     if verdict:
                         ElementTree.SubElement(test, verdict, message=message + suspicion)
                     _write(test, _numbers(record, output, deviations))
@@ -113,7 +114,7 @@ def _test(
     return ElementTree.SubElement(suite, "testcase", place)
 
 
-def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:
+def _verdict(record: Record, output: str, deviations: Deviations, facts: Facts) -> tuple[str, str]:
     """Return the element of a test case (none if it passed) and its message."""
     if record.outcome in (Outcome.UNJUDGED, Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
         return "skipped", f"{record.outcome.shown}: {record.message}"
@@ -121,7 +122,7 @@ def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, 
         (driver, values), *_ = record.driver.items()
         unit = record.outputs[output].unit
         off = [
-            describe(output, quantity, each, driver, values, unit)
+            describe(output, quantity, each, driver, values, unit, facts)
             for quantity, each in deviations.items()
             if not each.within
         ]

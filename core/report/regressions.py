@@ -16,9 +16,8 @@ from rich.text import Text
 from ..case.io.escape import visible
 from ..doors import offers
 from ..errors import number_of, shortened
-from ..harness.labels import motion_unit, number, product, unread_count
+from ..harness.labels import motion_unit, number, product, shown_change, unread_count
 from ..history.findings import WHY, Accepted, Finding, Kind, Loose, Regressions, Step
-from ..unit_text import value_text
 from . import terminal
 from .sections import environment
 from .table import escape_markdown, row
@@ -213,8 +212,8 @@ def step_says(step: Step) -> str:
     elif step.quantity == "time":
         what = f"{number(1e3 * step.before)} → {number(1e3 * step.now)} ms a sweep"
     else:
-        unit = motion_unit(step.unit, step.quantity)
-        what = f"{number(step.before)} → {value_text(number(step.now), unit)}"
+        unit, facts = motion_unit(step.unit, step.quantity), {"units": step.units}
+        what = shown_change(step.before, step.now, unit, facts if step.units else {})
     changed = ", ".join(map(str, step.changes)) or "no version, machine or commit changed there"
     repaired = f", repaired in run {step.repaired}" if step.repaired is not None else ""
     since = f"since run {step.first} ({step.started[:16].replace('T', ' ')}){repaired}"

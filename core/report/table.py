@@ -17,6 +17,7 @@ from ..errors import labelled
 from ..harness.labels import (
     account,
     against,
+    displayed,
     motion_unit,
     notes,
     shorten_names,
@@ -112,8 +113,9 @@ def print_outputs(results: Results, file: TextIO) -> None:
     for record in results.records:
         for name, errors in record.errors.items():
             unit = record.outputs[name].unit if name in record.outputs else LENGTH
-            cells = (_of_tolerance(getattr(errors, quantity)) for quantity in QUANTITIES)
-            cells = Text(visible(name)), *cells, Text(visible(unit))
+            shown, factor = displayed(unit, results.run.get("cases", {}).get(record.case, {}))
+            cells = (_of_tolerance(getattr(errors, quantity), factor) for quantity in QUANTITIES)
+            cells = Text(visible(name)), *cells, Text(visible(shown or unit))
             rows.append(((record.case, record.engine), cells))
     # the first error of forces, which have no position, is called value
     words = {motion_word(QUANTITIES[0], cells[-1].plain) for _, cells in rows} or {QUANTITIES[0]}
@@ -160,10 +162,10 @@ def print_summary(results: Results, file: TextIO) -> None:
     print_messages(results, terminal.console(file))
 
 
-def _of_tolerance(error: Deviation | None) -> Text:
+def _of_tolerance(error: Deviation | None, factor: float) -> Text:
     if error is None:
         return Text("–")
-    text = f"{error.max_abs:.1e} of {error.tolerance:.0e}"
+    text = f"{factor * error.max_abs:.1e} of {factor * error.tolerance:.0e}"
     return Text(text, style="" if error.within else "bold red")
 
 

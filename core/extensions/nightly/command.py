@@ -9,6 +9,7 @@ import re
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any, ClassVar
@@ -124,10 +125,10 @@ class Init(Command):
 
 def _ask(question: str, known: str | None, flag: str) -> str:
     """Return the answer of the user, or what is known if there is no terminal."""
+    answer = known
     if sys.stdin.isatty() and sys.stdout.isatty():
-        answer = input(f"{question}{f' [{known}]' if known else ''}? ").strip() or known
-    else:
-        answer = known
+        with suppress(EOFError):
+            answer = input(f"{question}{f' [{known}]' if known else ''}? ").strip() or known
     if not answer:
         raise KincheckError(f"nightly init: nothing here answers: {question}? Give {flag}.")
     return answer
