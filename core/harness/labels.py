@@ -210,6 +210,19 @@ def number(value: float | None) -> str:
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}" if exponent else mantissa
 
 
+LINES = 5
+"""Most lines of an engine's message that a table or Markdown shows."""
+
+
+def folded(message: str) -> str:
+    """Return a message without the middle of its lines, if it has many; the JSON has them."""
+    lines = message.splitlines()
+    if len(lines) <= LINES:
+        return message
+    left = len(lines) - LINES + 1
+    return "\n".join([*lines[: LINES - 2], f"[{left} lines more, all in the JSON]", lines[-1]])
+
+
 def value_words(value: Any) -> Any:
     """Return a value of any type from a results file, in words."""
     if isinstance(value, Mapping):

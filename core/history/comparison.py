@@ -367,6 +367,8 @@ def _find_moved(now: Record, before: Record, facts: Facts) -> Iterator[Finding]:
         return
     moved: set[str] = set()
     for each in quantities(now, before):
+        if each.judged and not each.judged.within and each.was_judged and each.was_judged.within:
+            continue  # a failure, which is reported there
         if each.judged:  # largest distance of two values within the tolerance of one standard
             limit = 2.0 * each.judged.tolerance
         else:  # forces set no scale for lengths

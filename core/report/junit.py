@@ -22,6 +22,7 @@ from ..harness.record import REFERENCE, Deviations, Facts, Outcome, Record, Resu
 from ..history.findings import Kind, Regressions
 from ..history.store import Pair
 from ..unit_text import motion_word
+from .regressions import TITLES
 
 COUNTS = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -163,7 +164,9 @@ def to_regression_junit(results: Results, found: Regressions) -> bytes:
         if (place, name) not in tests:
             tests[place, name] = _test(suites[finding.case], finding.pair, name)
         test = tests[place, name]
-        message = FORBIDDEN.sub("\ufffd", f"{finding.kind}: {finding.message}")
+        message = FORBIDDEN.sub(
+            "\ufffd", f"{TITLES.get(finding.kind, finding.kind)}: {finding.message}"
+        )
         verdict = test.find("failure")
         if verdict is None:
             verdict = ElementTree.SubElement(test, "failure")

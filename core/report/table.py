@@ -18,6 +18,7 @@ from ..harness.labels import (
     account,
     against,
     displayed,
+    folded,
     motion_unit,
     notes,
     shorten_names,
@@ -241,7 +242,8 @@ def print_messages(results: Results, console: Console) -> None:
         if outcome is Outcome.UNAVAILABLE:
             absent.setdefault(message.removeprefix(f"{engine} is "), []).append(engine)
         else:
-            said.append(f"{outcome.shown}: {shorten_names(cases)} · {engine}: {message}")
+            whose = f"{outcome.shown}: {shorten_names(cases)} · {engine}"
+            said.append(f"{whose}: {folded(message)}")
     said += [f"{Outcome.UNAVAILABLE}: {shorten_names(each)}: {why}" for why, each in absent.items()]
     for line in said:
         console.print(Text(visible(line, also="\n\t")), soft_wrap=True)
@@ -380,7 +382,7 @@ def to_markdown(results: Results) -> str:
     lines += [escape_markdown(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
         escape_markdown(
-            f"{outcome.shown.capitalize()}: {shorten_names(cases)} in {engine}: {message}."
+            f"{outcome.shown.capitalize()}: {shorten_names(cases)} in {engine}: {folded(message)}."
         )
         for (engine, outcome, message), cases in messages(results).items()
         if outcome is not Outcome.PASS
