@@ -210,17 +210,20 @@ def number(value: float | None) -> str:
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}" if exponent else mantissa
 
 
-LINES = 5
-"""Most lines of an engine's message that a table or Markdown shows."""
+LINES, CHARACTERS = 5, 2000
+"""Most lines and characters of an engine's message that a table or Markdown shows."""
 
 
 def folded(message: str) -> str:
-    """Return a message without the middle of its lines, if it has many; the JSON has them."""
+    """Return a message without its middle, if it is long; the JSON has it."""
     lines = message.splitlines()
-    if len(lines) <= LINES:
-        return message
-    left = len(lines) - LINES + 1
-    return "\n".join([*lines[: LINES - 2], f"[{left} lines more, all in the JSON]", lines[-1]])
+    if len(lines) > LINES:
+        left = f"[{len(lines) - LINES + 1} lines more, all in the JSON]"
+        message = "\n".join([*lines[: LINES - 2], left, lines[-1]])
+    if len(message) > CHARACTERS:
+        left = f"[{len(message) - CHARACTERS} characters more, all in the JSON]"
+        message = f"{message[: CHARACTERS // 2]} {left} {message[-CHARACTERS // 2 :]}"
+    return message
 
 
 def value_words(value: Any) -> Any:

@@ -60,7 +60,7 @@ def find(name: str | None, store: Store | None) -> Subject:
             )
         return _stored_run(store, row)
     rows = [row for row in store.runs() if row.status != "running"]
-    row = choose_state_run(rows, faultless(store), NIGHTS)
+    row = choose_state_run(rows, faultless(store, rows[:NIGHTS]), NIGHTS)
     if row is None:
         raise KincheckError(
             f"history {store.path}: no run to report; `kincheck run --history {store.path}`"
