@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,28 +11,22 @@ import numpy as np
 from ...case.case import Case
 from ...case.units import Unit
 from ...cli.registry import Registry
-from ...cli.shared_options import TOL
 from ...errors import KincheckError
-from ...harness.record import Outcome, Results
 from ...report.axis import number
 from ...report.sections import Report
 from ...trajectory import Array
 from ..compare.designs import comparison, designs_of
 from ..hardpoints.options import WheelOptions
-from ..hardpoints.read import case_of_hardpoints
 from ..hardpoints.reader import read_hardpoints
-from ..hardpoints.table import Hardpoint, HardpointTable, unit_of
+from ..hardpoints.table import HardpointTable, unit_of
 from ..sweep.curves import curves
 from .goals import Goal, read_goals, read_moves
 from .least_move import HELD, LeastMove, least_move
+from .new_table import case_of_points, check, moved_points
 
-CHECKS = ("mujoco", "pinocchio", "exudyn")
-"""Engines that solve the answer again, the first that is installed."""
 TIGHT = 1e-5
 """A sample this close to an edge of its band, over the half-width, is tight."""
 SAME_NORM = 1e-6
-DIGITS = 12
-"""Digits of written coordinates: a thousandth of the accuracy of the bands and more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +195,7 @@ def tune(
     table = read_hardpoints(file, supplied)
     length = unit_of(table, supplied.units)
     moves = dict(zip(boxes, (best.moves * search.box).tolist(), strict=True))
-    points = _moved(table, moves, length)
+    points = moved_points(table, moves, length)
     after = search.values(best.moves)
     bands = [
         _band(case, goal, before, after, worth)
@@ -209,8 +203,8 @@ def tune(
     ]
     checked, report = None, None
     if best.held:
-        new = _case_of(table, supplied, points, case, file)
-        checked, results = _checked(case, new, registry)
+        new = case_of_points(table, supplied, points, case, file)
+        checked, results = check(case, new, registry)
         notes += [] if checked else ["no other engine is installed that can check the new table"]
         report = comparison(designs_of(results, [case, new]), [])
     return Tuned(
@@ -241,66 +235,3 @@ def _band(
         float(values[off.argmax()]),
         worth / goal.tolerance,
     )
-
-
-def _moved(
-    table: HardpointTable, moves: Mapping[str, float], length: Unit
-) -> list[tuple[float, float, float]]:
-    """Return the points of the table with the moves, in its own units and axes."""
-    found = list[tuple[float, float, float]]()
-    for name, old in table.points.items():
-        x, y, z = (
-            float(f"{value + moves[place] / length.size:.{DIGITS}g}")
-            if (place := f"{name} {axis}") in moves
-            else value
-            for axis, value in zip("xyz", old.position, strict=True)
-        )
-        found.append((x, y, z))
-    return found
-
-
-def _case_of(
-    table: HardpointTable,
-    supplied: WheelOptions,
-    points: Sequence[tuple[float, float, float]],
-    case: Case,
-    file: Path,
-) -> Case:
-    """Return the case of the new table, read as the old one, at the same samples."""
-    rows = {
-        name: Hardpoint(row, table.points[name].where)
-        for name, row in zip(table.points, points, strict=True)
-    }
-    new = case_of_hardpoints(replace(table, points=rows), supplied)
-    return replace(
-        new,
-        name=f"{file.stem} tuned",
-        sweep=replace(new.sweep, values=case.sweep.values),
-        reference={},
-    )
-
-
-def _checked(old: Case, new: Case, registry: Registry) -> tuple[str | None, Results]:
-    """Return the engine that solved the new design again, and the results of the native one.
-
-    Raises:
-        KincheckError: an engine contradicts the native one.
-    """
-    from ...harness import run as running
-
-    native = registry.engine("native")
-    results = running.run([old, new], [native], tol=TOL)
-    for name in CHECKS:
-        if name not in registry.engines:
-            continue
-        engine = registry.engine(name)
-        if engine.version() is None or engine.unsupported(new) is not None:
-            continue
-        (record,) = running.run([new], [engine], tol=TOL, baseline=native).records
-        if record.outcome is not Outcome.PASS:
-            raise KincheckError(
-                f"{new.name}: {name} does not confirm the new table ({record.outcome}:"
-                f" {record.message}); nothing is written. Run kincheck run on both."
-            )
-        return name, results
-    return None, results
