@@ -123,7 +123,8 @@ class Search:
     """The outputs of a case over their bands, by the moves over their boxes."""
 
     def __init__(self, case: Case, goals: Sequence[Goal], boxes: Mapping[str, float]) -> None:
-        self.case, self.goals, self.places = case, goals, [*boxes]
+        self.case, self.goals, self.boxes = case, goals, boxes
+        self.places = [*boxes]
         self.box = np.array([*boxes.values()])
         self.names = [*dict.fromkeys(each.output for each in goals)]
         self.designs = 0
@@ -140,7 +141,7 @@ class Search:
         usable = found.solved.all() and np.isfinite(g).all() and np.isfinite(slopes).all()
         return (g, slopes) if usable else None
 
-    def values(self, u: Array) -> dict[str, Array]:
+    def values(self, u: Array, remedy: str = "give a smaller --travel") -> dict[str, Array]:
         """Return the outputs of a design, shape (n,) each.
 
         Raises:
@@ -150,7 +151,7 @@ class Search:
         if not found.solved.all():
             raise KincheckError(
                 f"{self.case.name}: the table does not reach its whole travel"
-                f" ({found.messages.get(0, 'no reason given')}); give a smaller --travel"
+                f" ({found.messages.get(0, 'no reason given')}); {remedy}"
             )
         for each in self.goals:
             if not np.isfinite(found.values[each.output][0, each.at]).all():

@@ -1,0 +1,384 @@
+"""The table that a rig measured: its most likely points, what the rig determines of them, and the
+slips of its file that fit as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import combinations as pairs
+from math import erfc, log
+from pathlib import Path
+
+import numpy as np
+
+from ...case.case import PER_TRAVEL, TIME, Case, Output
+from ...case.io.reader_options import CurveOptions
+from ...case.units import Unit
+from ...errors import KincheckError, unknown
+from ...harness.suspects import FACTORS
+from ...report.axis import ZERO
+from ...trajectory import Array
+from ..sweep.curves import curves
+from .goals import read_box, read_moves, unit_in_table
+from .identify import Combination, combinations, in_words, without_effect
+from .likely import Estimate, most_likely
+from .rig import Rig, RigModel, read_rig, with_scatter
+
+ALPHA = 0.01
+"""Data are off, if such ones have a smaller probability."""
+NORMAL = 1.959963984540054
+"""Half-width of an interval of 95 % over the deviation."""
+BETTER = 0.5**0.5
+"""What is left of the drawing's deviation, where the rig tells as much."""
+LESS = 2.0 * log(1000.0)
+"""A slip is named, if its data are at most a thousand times less likely."""
+MOST_FOUND = 6
+# A linear misfit this many times the mean will not end near it.
+_HOPELESS = 100.0
+_UNKNOWN_SCALE = 0.01
+
+
+class Verdict(StrEnum):
+    """Whether data and model agree."""
+
+    FITS = "fits"
+    OTHERS = "fits, others too"
+    OFF = "does not fit"
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """A shift of the measured numbers: a zero, a scale, or one sample.
+
+    Attributes:
+        direction: over the noise, for a size of one, shape (numbers,).
+        size, deviation: by how much the rig reads too much [SI].
+        unit: of its text.
+        chance: probability of a shift as large, if there is none.
+    """
+
+    name: str
+    direction: Array
+    size: float
+    deviation: float
+    unit: Unit
+    chance: float
+
+    @property
+    def words(self) -> str:
+        """Name and size, with its interval."""
+        size, half = self.size / self.unit.size, NORMAL * self.deviation / self.unit.size
+        return f"{self.name} {size:+.3g} ± {half:.2g} {self.unit.name}"
+
+
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """A slip of the rig's file that fits.
+
+    Attributes:
+        chance: probability of its misfit.
+        largest: largest move over the drawing's deviation.
+    """
+
+    name: str
+    chance: float
+    largest: float
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """An output that was not measured, at the samples [SI].
+
+    Attributes:
+        values, deviations: by rig and drawing; drawing: deviations by the drawing alone.
+    """
+
+    values: Array
+    deviations: Array
+    drawing: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The answer.
+
+    Attributes:
+        boxes: the drawing's deviation of each place [m].
+        first: the estimate from the data as they are; estimate: that without the shifts found.
+        shifts: zeros and scales, as tested in the end; found: shifts without which the data do not
+            fit, the clearest first.
+        worst: the number farthest off, in words.
+        slips: that fit the data as they are.
+        combinations: the best known first.
+        null: combinations without effect on what was measured, in words.
+        idle: places left out, since nothing measured follows them.
+        predictions: by output.
+    """
+
+    rig: Rig
+    boxes: Mapping[str, float]
+    first: Estimate
+    estimate: Estimate
+    shifts: Sequence[Shift]
+    found: Sequence[Shift]
+    worst: str
+    slips: Sequence[Slip]
+    combinations: Sequence[Combination]
+    null: Sequence[str]
+    idle: Sequence[str]
+    predictions: Mapping[str, Prediction]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether data and model agree, and whether slips do too."""
+        if self.first.probability < ALPHA or self.found:
+            return Verdict.OFF
+        return Verdict.OTHERS if self.slips or self.loose else Verdict.FITS
+
+    @property
+    def loose(self) -> list[Shift]:
+        """The scales that the rig does not tell."""
+        return [
+            each
+            for each in self.shifts
+            if each.unit.name == "%" and NORMAL * each.deviation > _UNKNOWN_SCALE
+        ]
+
+    @property
+    def moves(self) -> dict[str, float]:
+        """The most likely moves from the drawing, by place [m]."""
+        moved = self.estimate.u * np.array([*self.boxes.values()])
+        return dict(zip(self.boxes, moved.tolist(), strict=True))
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """The deviation of each move [m]."""
+        sizes = np.sqrt(np.diag(self.estimate.covariance)) * np.array([*self.boxes.values()])
+        return dict(zip(self.boxes, sizes.tolist(), strict=True))
+
+
+def fit(
+    case: Case,
+    file: Path,
+    options: CurveOptions,
+    drawing: str,
+    moves: Sequence[str] = (),
+    free: Sequence[str] = (),
+) -> Fitted:
+    """Return the most likely moves of a table, by a rig and the drawing.
+
+    Args:
+        file: of the rig.
+        drawing: the drawing's deviation, as text.
+        moves: places that may be off, as texts; all by default.
+        free: names of the shifts that the rig may have.
+
+    Raises:
+        KincheckError: the file or an option makes no sense, or the table does not reach the travel
+            of the rig.
+    """
+    rig, boxes = read_rig(case, file, options), _boxes(case, drawing, moves)
+    model = rig.model(boxes)
+    start = np.zeros(len(boxes))
+    remedy = "leave out the rows of the rig beyond it, or correct the table"
+    rig = with_scatter(rig, model.search.values(start, remedy), file)
+    model = rig.model(boxes)
+    given = model(start)
+    if given is None:
+        raise KincheckError(
+            f"{file}: a measured output has no slope by the points of {case.name} at a sample;"
+            " leave its column out"
+        )
+    size = np.abs(given[1]).max(axis=0)
+    idle = [] if moves else [each for each, x in zip(boxes, size, strict=True) if not x]
+    if idle:
+        boxes = {place: box for place, box in boxes.items() if place not in idle}
+        model, start = rig.model(boxes), np.zeros(len(boxes))
+    if not boxes:
+        raise KincheckError(f"{file}: nothing measured follows a point of {case.name}")
+
+    freed = _named(free, [*_offsets(model, _estimate(model, []))])
+    first = estimate = _estimate(model, freed)
+    slips = [*_slips(model, first)] if first.probability < ALPHA else []
+    found = list[Shift]()
+    while True:
+        taken = {each.name for each in (*freed, *found)}
+        offsets = [each for each in _offsets(model, estimate) if each.name not in taken]
+        tests = [_sized(each, estimate) for each in (*offsets, *_samples(rig))]
+        offsets = tests[: len(offsets)]
+        clearest = min(tests, key=lambda each: (each.chance, -abs(each.size / each.deviation)))
+        if slips or len(found) == MOST_FOUND or clearest.chance * len(tests) >= ALPHA:
+            break
+        found.append(clearest)
+        estimate = _estimate(model, [*freed, *found])
+    at = tests[len(offsets) :]
+    worst = max(at, key=lambda each: abs(each.size / each.deviation))
+    null = without_effect(_over_travel(model, estimate.u, case))
+    fitted = Fitted(
+        *(rig, boxes, first, estimate, offsets),
+        [_alone(each, k, [*freed, *found], estimate) for k, each in enumerate(found, len(freed))],
+        *(worst.words, slips or [*_slips(model, estimate)], combinations(estimate, boxes)),
+        *([], idle, predictions(model, estimate)),
+    )
+    box = np.array([*boxes.values()])
+    return replace(fitted, null=in_words(null, case, fitted.moves, box))
+
+
+def _boxes(case: Case, drawing: str, moves: Sequence[str]) -> dict[str, float]:
+    usual = read_box(drawing, f"--drawing {drawing!r}", case)
+    if moves:
+        return read_moves(moves, case, drawing)
+    rows = [each.name for each in case.hardpoints if each.moves]
+    return {f"{row} {axis}": usual for row in rows for axis in "xyz"}
+
+
+def _estimate(model: RigModel, free: Sequence[Shift]) -> Estimate:
+    columns = np.array([each.direction for each in free]).reshape(-1, model.rig.count).T
+    found = most_likely(model, np.zeros(len(model.search.boxes)), columns)
+    assert found is not None  # the drawing reaches all samples
+    return found
+
+
+def _offsets(model: RigModel, estimate: Estimate) -> Iterator[Shift]:
+    """Yield zeros and scales of outputs and travel, of any size."""
+    rig, percent = model.rig, Unit("%", 0.01, float)
+    values = rig.of(model.search.values(estimate.u))
+    for goal in rig.goals:
+        rows = rig.rows(goal) * rig.weights
+        yield Shift(f"{goal.output} zero", rows, 0.0, np.inf, rig.unit(goal), 1.0)
+        if (rows * values).any():
+            yield Shift(f"{goal.output} scale", rows * values, 0.0, np.inf, percent, 1.0)
+    sweep = rig.case.sweep
+    slopes = model.by_travel(estimate.u) if sweep.driver != TIME else np.array(np.nan)
+    if np.isfinite(slopes).all():
+        turns = rig.case.mechanism.driver(sweep.driver).turns
+        unit = unit_in_table("rad" if turns else "m", rig.case)
+        along = -slopes * rig.weights
+        travel = np.array([sweep.change[k] for _, k in rig.places])
+        yield Shift("travel zero", along, 0.0, np.inf, unit, 1.0)
+        yield Shift("travel scale", along * travel, 0.0, np.inf, percent, 1.0)
+
+
+def _samples(rig: Rig) -> Iterator[Shift]:
+    """Yield each number as a shift of its own."""
+    turns = rig.case.sweep.driver != TIME and rig.case.mechanism.driver(rig.case.sweep.driver).turns
+    along = Unit("s", 1.0, float)
+    if rig.case.sweep.driver != TIME:
+        along = unit_in_table("rad" if turns else "m", rig.case)
+    for k, (goal, at) in enumerate(rig.places):
+        where = rig.case.sweep.values[at] / along.size
+        direction = np.zeros(rig.count)
+        direction[k] = rig.weights[k]
+        name = f"{goal.output} at {where:.4g} {along.name}"
+        yield Shift(name, direction, 0.0, np.inf, rig.unit(goal), 1.0)
+
+
+def _sized(shift: Shift, estimate: Estimate) -> Shift:
+    size, deviation = estimate.shift(shift.direction)
+    chance = erfc(abs(size / deviation) * BETTER)
+    return replace(shift, size=size, deviation=deviation, chance=chance)
+
+
+def _alone(shift: Shift, k: int, every: Sequence[Shift], estimate: Estimate) -> Shift:
+    """Return a shift with its size beside the others."""
+    free = np.delete(estimate.free, k, axis=1)
+    size, deviation = replace(estimate, free=free).shift(every[k].direction)
+    return replace(shift, size=size, deviation=deviation)
+
+
+def _named(names: Sequence[str], known: Sequence[Shift]) -> list[Shift]:
+    found = {each.name: each for each in known}
+    for name in names:
+        if name not in found:
+            raise KincheckError(f"--free {name!r}: {unknown('offset', name, found)}")
+    return [found[name] for name in names]
+
+
+def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
+    """Yield the slips of the rig's file that fit, the likeliest first; if the data fit, those that
+    fit as well.
+    """
+    rig = model.rig
+    box = model.search.boxes
+    slips = dict[str, Rig]()
+    for goal in rig.goals:
+        slips[f"{goal.output} negated"] = rig.times({goal.output: -1.0})
+        for name, factor in FACTORS.items():
+            slips[f"{goal.output} times {name}"] = rig.times({goal.output: factor})
+    for one, other in pairs(rig.goals, 2):
+        if one.unit == other.unit and one.at.tolist() == other.at.tolist():
+            middle = {one.output: other.middle, other.output: one.middle}
+            goals = [replace(g, middle=middle.get(g.output, g.middle)) for g in rig.goals]
+            slips[f"{one.output} and {other.output} exchanged"] = replace(rig, goals=goals)
+    if rig.case.sweep.driver != TIME:
+        sweep = rig.case.sweep
+        slips["travel negated"] = replace(rig, case=rig.at(2.0 * sweep.design - sweep.values))
+    fits = list[tuple[float, Slip]]()
+    for name, slipped in slips.items():
+        changed = slipped.model(box)
+        near = changed(estimate.u)
+        if near is None:
+            continue
+        off, slopes = near
+        free = estimate.free * (slipped.weights / rig.weights)[:, None]
+        if _linear_misfit(replace(estimate, off=off, slopes=slopes)) > _HOPELESS * rig.count:
+            continue
+        found = most_likely(changed, np.zeros(len(box)), free)
+        if found is not None and found.probability >= ALPHA:
+            largest = float(np.abs(found.u).max())
+            fits.append((found.evidence, Slip(name, found.probability, largest)))
+    fits.sort(key=lambda each: each[0])
+    best = min([each for each, _ in fits], default=np.inf)
+    if estimate.probability >= ALPHA:
+        best = estimate.evidence
+    yield from (slip for each, slip in fits if each <= best + LESS)
+
+
+def _linear_misfit(estimate: Estimate) -> float:
+    system = np.vstack([estimate.slopes, np.eye(len(estimate.u))])
+    right = np.concatenate([estimate.slopes @ estimate.u - estimate.off, np.zeros(len(estimate.u))])
+    left = system @ np.linalg.lstsq(system, right)[0] - right
+    return float(left @ left)
+
+
+def _over_travel(model: RigModel, u: Array, table: Case) -> Array:
+    """Return the slopes over the noise, at the samples of the rig and of the table, where they are
+    known: what has no effect over a part of the travel has none anywhere, and a longer part tells
+    it better from a small effect.
+    """
+    rig, search = model.rig, model.search
+    travel = np.concatenate([rig.case.sweep.values, table.sweep.values])
+    found = curves(
+        rig.at(travel), search.places, (u * search.box)[None], search.names, search.names
+    )
+    rows = [
+        found.slopes[goal.output][0] * search.box / float(np.median(noise))
+        for goal, noise in zip(rig.goals, rig.noise, strict=True)
+    ]
+    every = np.concatenate(rows)
+    return every[np.isfinite(every).all(axis=1)]
+
+
+def predictions(model: RigModel, estimate: Estimate) -> dict[str, Prediction]:
+    search, case = model.search, model.search.case
+    names = [
+        each.name
+        for each in case.outputs
+        if not (each.forces or isinstance(each, Output))
+        and PER_TRAVEL not in each.name
+        and each.name not in search.names
+    ]
+    if not names:
+        return {}
+    place = (estimate.u * search.box)[None]
+    found = curves(case, search.places, place, names, names)
+    told = dict[str, Prediction]()
+    for name in names:
+        slopes = found.slopes[name][0] * search.box
+        spread = np.sqrt(np.einsum("si,ij,sj->s", slopes, estimate.covariance, slopes))
+        drawn = np.linalg.norm(slopes, axis=1)
+        if np.nanmax(drawn, initial=0.0) > ZERO:
+            told[name] = Prediction(found.values[name][0], spread, drawn)
+    return told
