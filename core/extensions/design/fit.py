@@ -15,14 +15,14 @@ import numpy as np
 
 from ...case.case import PER_TRAVEL, TIME, Case, Output
 from ...case.io.reader_options import CurveOptions
-from ...case.units import Unit
+from ...case.units import ANGLES, Unit
 from ...errors import KincheckError, unknown
 from ...harness.suspects import FACTORS
 from ...report.axis import ZERO
 from ...trajectory import Array
 from ..sweep.curves import curves
 from .goals import read_box, read_moves, unit_in_table
-from .identify import Combination, combinations, in_words, without_effect
+from .identify import Combination, combinations, without_effect
 from .likely import Estimate, most_likely
 from .rig import Rig, RigModel, read_rig, with_scatter
 
@@ -35,6 +35,8 @@ BETTER = 0.5**0.5
 LESS = 2.0 * log(1000.0)
 """A slip is named, if its data are at most a thousand times less likely."""
 MOST_FOUND = 6
+LONG, LONGEST = 3.0, 121
+"""Times the travel of rig and table, and samples, on which combinations without effect are told."""
 # A linear misfit this many times the mean will not end near it.
 _HOPELESS = 100.0
 _UNKNOWN_SCALE = 0.01
@@ -65,6 +67,11 @@ class Shift:
     deviation: float
     unit: Unit
     chance: float
+
+    @property
+    def si(self) -> str:
+        """The unit of its size."""
+        return "1" if self.unit.name == "%" else "rad" if self.unit.name in ANGLES else "m"
 
     @property
     def words(self) -> str:
@@ -147,6 +154,16 @@ class Fitted:
         ]
 
     @property
+    def length(self) -> Unit:
+        """The unit of the table."""
+        return unit_in_table("m", self.rig.case)
+
+    def unit_of(self, output: str) -> Unit:
+        """Return the unit of an output as the table has it."""
+        units = {each.name: each.unit for each in self.rig.case.outputs}
+        return unit_in_table(units[output], self.rig.case)
+
+    @property
     def moves(self) -> dict[str, float]:
         """The most likely moves from the drawing, by place [m]."""
         moved = self.estimate.u * np.array([*self.boxes.values()])
@@ -215,7 +232,7 @@ def fit(
         estimate = _estimate(model, [*freed, *found])
     at = tests[len(offsets) :]
     worst = max(at, key=lambda each: abs(each.size / each.deviation))
-    null = without_effect(_over_travel(model, estimate.u, case))
+    slopes = _over_travel(model, estimate.u, case)
     fitted = Fitted(
         *(rig, boxes, first, estimate, offsets),
         [_alone(each, k, [*freed, *found], estimate) for k, each in enumerate(found, len(freed))],
@@ -223,7 +240,7 @@ def fit(
         *([], idle, predictions(model, estimate)),
     )
     box = np.array([*boxes.values()])
-    return replace(fitted, null=in_words(null, case, fitted.moves, box))
+    return replace(fitted, null=without_effect(slopes, case, fitted.moves, box))
 
 
 def _boxes(case: Case, drawing: str, moves: Sequence[str]) -> dict[str, float]:
@@ -344,24 +361,22 @@ def _linear_misfit(estimate: Estimate) -> float:
 
 
 def _over_travel(model: RigModel, u: Array, table: Case) -> Array:
-    """Return the slopes over the noise, at the samples of the rig and of the table, where they are
-    known: what has no effect over a part of the travel has none anywhere, and a longer part tells
-    it better from a small effect.
+    """Return slopes of what was measured over a long travel as far as it is reached, each row of
+    size one: what has no effect over a part of the travel has none anywhere, and a longer part
+    tells it better from a small effect.
     """
     rig, search = model.rig, model.search
-    travel = np.concatenate([rig.case.sweep.values, table.sweep.values])
-    found = curves(
-        rig.at(travel), search.places, (u * search.box)[None], search.names, search.names
-    )
-    rows = [
-        found.slopes[goal.output][0] * search.box / float(np.median(noise))
-        for goal, noise in zip(rig.goals, rig.noise, strict=True)
-    ]
-    every = np.concatenate(rows)
-    return every[np.isfinite(every).all(axis=1)]
+    every = np.concatenate([rig.case.sweep.change, table.sweep.change])
+    travel = rig.case.sweep.design + np.linspace(LONG * every.min(), LONG * every.max(), LONGEST)
+    names = search.names
+    found = curves(rig.at(travel), search.places, (u * search.box)[None], names, names)
+    rows = np.concatenate([found.slopes[name][0] * search.box for name in names])
+    rows = rows[np.isfinite(rows).all(axis=1) & (np.abs(rows) > 0.0).any(axis=1)]
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 
 def predictions(model: RigModel, estimate: Estimate) -> dict[str, Prediction]:
+    """Return what rig and drawing say of the outputs that were not measured, by name."""
     search, case = model.search, model.search.case
     names = [
         each.name

@@ -11,11 +11,11 @@ from ...case.case import Case
 from ...trajectory import Array
 from .likely import Estimate
 
-NULL = 2e-15
+NULL = 3e-15
 """A combination whose singular value is this part of the largest has no effect: exact slopes leave
-1e-16 of those that have none, and over the travel of a table 5e-14 or more of all others."""
-# An effect that is named differs from none by round-off; directions are of size one.
-_SAME, _OWN = 1e-6, 1e-3
+some 1e-16 of those that have none."""
+# Directions of size one are another, if so much is left beside those known.
+_OWN = 1e-3
 MOST_TERMS, LEAST_TERM = 4, 0.1
 
 
@@ -64,33 +64,28 @@ def combinations(estimate: Estimate, boxes: Mapping[str, float]) -> list[Combina
     return found
 
 
-def without_effect(slopes: Array) -> Array:
-    """Return orthonormal combinations of the columns without effect, as rows."""
-    _, sizes, rows = np.linalg.svd(slopes)
-    sizes = np.append(sizes, np.zeros(len(rows) - len(sizes)))
-    return rows[sizes <= NULL * sizes[0]]
-
-
-def in_words(null: Array, case: Case, moves: Mapping[str, float], box: Array) -> list[str]:
-    """Return names of combinations without effect, as many as there are: places, points that slide
-    along the line to another one, all points together, and else their terms.
+def without_effect(slopes: Array, case: Case, moves: Mapping[str, float], box: Array) -> list[str]:
+    """Return names of combinations of moves without effect, as many as there are: places, points
+    that slide along the line to another one, all points together, and else their terms.
 
     Args:
-        null: orthonormal combinations of the moves over their boxes, as rows.
+        slopes: by the moves over their boxes, rows of size one.
         moves: by place [m].
     """
-    names, left = list[str](), null
+    _, sizes, rows = np.linalg.svd(slopes)
+    sizes = np.append(sizes, np.zeros(len(rows) - len(sizes)))
+    null = rows[sizes <= NULL * sizes[0]]
+    names, known = list[str](), np.empty((0, len(box)))
     for name, direction in _candidates(case, moves):
         u = direction / box
-        u /= np.linalg.norm(u) or 1.0
-        part = left @ u
-        whole = np.linalg.norm(u - null.T @ (null @ u)) < _SAME
-        if whole and len(left) and np.linalg.norm(part) > _OWN:
+        u /= np.linalg.norm(u)
+        own = u - known.T @ (known @ u)
+        new = np.linalg.norm(own) > _OWN and len(names) < len(null)
+        if new and np.linalg.norm(slopes @ u) <= NULL * sizes[0]:
             names.append(name)
-            # the rest of the space, without this direction
-            basis = np.linalg.svd(part[None])[2][1:]
-            left = basis @ left
-    for row in left:
+            known = np.vstack([known, own / np.linalg.norm(own)])
+    rest = null - (null @ known.T) @ known
+    for row in np.linalg.svd(rest)[2][: len(null) - len(names)]:
         terms = row * box
         places = zip(moves, (terms / terms[np.abs(terms).argmax()]).tolist(), strict=True)
         names.append(Combination(dict(places), 0.0, 0.0, 0.0).words)

@@ -9,17 +9,65 @@ from pathlib import Path
 from ...case.case import Case
 from ...case.units import Unit
 from ...cli.registry import Registry
-from ...cli.shared_options import TOL
+from ...cli.shared_options import TOL, OfCase
 from ...errors import KincheckError
 from ...harness.record import Outcome, Results
 from ..hardpoints.options import WheelOptions
 from ..hardpoints.read import case_of_hardpoints
-from ..hardpoints.table import Hardpoint, HardpointTable
+from ..hardpoints.reader import read_hardpoints
+from ..hardpoints.saving import write_table
+from ..hardpoints.table import Hardpoint, HardpointTable, unit_of
 
 CHECKS = ("mujoco", "pinocchio", "exudyn")
 """Engines that solve the answer again, the first that is installed."""
 DIGITS = 12
 """Digits of written coordinates: a thousandth of the accuracy of the bands and more."""
+
+
+def require_new(out: Path | None) -> None:
+    """Refuse a file that exists, or is no CSV.
+
+    Raises:
+        KincheckError: it is so.
+    """
+    if out is not None and (out.exists() or out.suffix.lower() != ".csv"):
+        what = "the file exists and stays" if out.exists() else "is written as CSV"
+        raise KincheckError(f"--out {out}: {what}; give a new name that ends in .csv")
+
+
+def table_of(options: OfCase, registry: Registry) -> tuple[Case, Path]:
+    """Return the case of a table, and its file.
+
+    Raises:
+        KincheckError: the case is no table.
+    """
+    case = registry.case_of(options)
+    if isinstance(options.case, Case) or not case.hardpoints:
+        raise KincheckError(
+            f"{case.name}: is no table of hardpoints; give a table, such as car.csv"
+        )
+    return case, Path(options.case)
+
+
+def write_new(
+    out: Path,
+    case: Case,
+    file: Path,
+    supplied: WheelOptions,
+    moves: Mapping[str, float],
+    registry: Registry,
+) -> str | None:
+    """Write a table with moves by place [m], and return the engine that solved it again; None
+    without one.
+
+    Raises:
+        KincheckError: an engine contradicts the native one, or the file cannot be written.
+    """
+    table = read_hardpoints(file, supplied)
+    points = moved_points(table, moves, unit_of(table, supplied.units))
+    checked, _ = check(case, case_of_points(table, supplied, points, case, file), registry)
+    write_table(table, supplied, points, out, f"--out {out}")
+    return checked
 
 
 def moved_points(
@@ -53,7 +101,7 @@ def case_of_points(
     new = case_of_hardpoints(replace(table, points=rows), supplied)
     return replace(
         new,
-        name=f"{file.stem} tuned",
+        name=f"{file.stem} new",
         sweep=replace(new.sweep, values=case.sweep.values),
         reference={},
     )

@@ -21,8 +21,9 @@ from ..sweep.curves import curves
 from .goals import Goal, unit_in_table
 from .tune import Search
 
-DEGREE = 6
-"""A polynomial of this degree follows what is left of a curve beside that of a near design."""
+DEGREE, FEWEST = 6, 9
+"""A polynomial of this degree follows what is left of a curve beside that of a near design; with
+few samples, of a third of them, and not with fewer than nine."""
 SCATTER = 2.0
 """Scatter this many times the noise of the digits is noise of the rig."""
 # The median of absolute values of normal numbers, and the width of evenly spread rounding.
@@ -161,12 +162,12 @@ def with_scatter(rig: Rig, drawn: Mapping[str, Array], file: Path) -> Rig:
     noise, sources = [*rig.noise], [*rig.sources]
     for k, goal in enumerate(rig.goals):
         travel = rig.case.sweep.values[goal.at]
-        enough = len({*travel.tolist()}) >= 2 * (DEGREE + 1)
-        if sources[k] != "as stated" and enough:
-            off = goal.middle - drawn[goal.output][goal.at]
-            smooth = np.polynomial.Chebyshev.fit(travel, off, DEGREE)
-            rest = np.abs(off - smooth(travel))
-            lost = (len(rest) / (len(rest) - DEGREE - 1.0)) ** 0.5
+        count = len({*travel.tolist()})
+        if sources[k] != "as stated" and count >= FEWEST:
+            off, degree = goal.middle - drawn[goal.output][goal.at], min(DEGREE, count // 3)
+            rest = np.abs(off - np.polynomial.Chebyshev.fit(travel, off, degree)(travel))
+            # the median of few samples may be low
+            lost = (len(rest) / (len(rest) - degree - 1.0)) ** 0.5 * (1.0 + len(rest) ** -0.5)
             scatter = float(np.median(rest)) / _MEDIAN * lost
             if scatter > SCATTER * float(np.median(noise[k])):
                 noise[k], sources[k] = np.hypot(noise[k], scatter), "scatter of its samples"
