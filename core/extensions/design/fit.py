@@ -35,6 +35,8 @@ BETTER = 0.5**0.5
 LESS = 2.0 * log(1000.0)
 """A slip is named, if its data are at most a thousand times less likely."""
 MOST_FOUND = 6
+ROUND_OFF = 1e-9
+"""Effects smaller than this part of the largest are none: real ones are a thousand times larger."""
 LONG, LONGEST = 3.0, 121
 """Times the travel of rig and table, and samples, on which combinations without effect are told."""
 # A linear misfit this many times the mean will not end near it.
@@ -208,8 +210,11 @@ def fit(
             f"{file}: a measured output has no slope by the points of {case.name} at a sample;"
             " leave its column out"
         )
-    size = np.abs(given[1]).max(axis=0)
-    idle = [] if moves else [each for each, x in zip(boxes, size, strict=True) if not x]
+    # at a drawing with round numbers an effect may be zero by chance
+    near = model(np.random.default_rng(0).uniform(-0.5, 0.5, len(boxes))) or given
+    size = np.abs(near[1]).max(axis=0)
+    idle = [place for place, x in zip(boxes, size, strict=True) if x <= ROUND_OFF * size.max()]
+    idle = [] if moves else idle
     if idle:
         boxes = {place: box for place, box in boxes.items() if place not in idle}
         model, start = rig.model(boxes), np.zeros(len(boxes))
@@ -370,9 +375,13 @@ def _over_travel(model: RigModel, u: Array, table: Case) -> Array:
     travel = rig.case.sweep.design + np.linspace(LONG * every.min(), LONG * every.max(), LONGEST)
     names = search.names
     found = curves(rig.at(travel), search.places, (u * search.box)[None], names, names)
-    rows = np.concatenate([found.slopes[name][0] * search.box for name in names])
-    rows = rows[np.isfinite(rows).all(axis=1) & (np.abs(rows) > 0.0).any(axis=1)]
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    kept = list[Array]()
+    for name in names:
+        rows = found.slopes[name][0] * search.box
+        size = np.linalg.norm(rows, axis=1)
+        known = size > ROUND_OFF * np.nanmax(size)  # at design some are zero
+        kept.append(rows[known] / size[known, None])
+    return np.concatenate(kept)
 
 
 def predictions(model: RigModel, estimate: Estimate) -> dict[str, Prediction]:

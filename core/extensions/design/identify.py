@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +11,10 @@ from ...case.case import Case
 from ...trajectory import Array
 from .likely import Estimate
 
-NULL = 3e-15
-"""A combination whose singular value is this part of the largest has no effect: exact slopes leave
-some 1e-16 of those that have none."""
+NULL, NAMED = 1e-15, 1e-13
+"""A combination with this part of the largest effect has none, by the round-off of exact slopes. Of
+all combinations some have little more; of those that can be named none has.
+"""
 # Directions of size one are another, if so much is left beside those known.
 _OWN = 1e-3
 MOST_TERMS, LEAST_TERM = 4, 0.1
@@ -72,20 +73,19 @@ def without_effect(slopes: Array, case: Case, moves: Mapping[str, float], box: A
         slopes: by the moves over their boxes, rows of size one.
         moves: by place [m].
     """
-    _, sizes, rows = np.linalg.svd(slopes)
-    sizes = np.append(sizes, np.zeros(len(rows) - len(sizes)))
-    null = rows[sizes <= NULL * sizes[0]]
+    largest = np.linalg.norm(slopes, 2)
     names, known = list[str](), np.empty((0, len(box)))
     for name, direction in _candidates(case, moves):
         u = direction / box
         u /= np.linalg.norm(u)
         own = u - known.T @ (known @ u)
-        new = np.linalg.norm(own) > _OWN and len(names) < len(null)
-        if new and np.linalg.norm(slopes @ u) <= NULL * sizes[0]:
+        if np.linalg.norm(own) > _OWN and np.linalg.norm(slopes @ u) <= NAMED * largest:
             names.append(name)
             known = np.vstack([known, own / np.linalg.norm(own)])
-    rest = null - (null @ known.T) @ known
-    for row in np.linalg.svd(rest)[2][: len(null) - len(names)]:
+    others = np.linalg.svd(known)[2][len(known) :] if len(known) else np.eye(len(box))
+    _, sizes, rows = np.linalg.svd(slopes @ others.T)
+    sizes = np.append(sizes, np.zeros(len(rows) - len(sizes)))
+    for row in rows[sizes <= NULL * largest] @ others:
         terms = row * box
         places = zip(moves, (terms / terms[np.abs(terms).argmax()]).tolist(), strict=True)
         names.append(Combination(dict(places), 0.0, 0.0, 0.0).words)
@@ -95,17 +95,6 @@ def without_effect(slopes: Array, case: Case, moves: Mapping[str, float], box: A
 def _candidates(case: Case, moves: Mapping[str, float]) -> Iterator[tuple[str, Array]]:
     """Yield names and directions of moves [m] that may have no effect, the plainest first."""
     places = [*moves]
-
-    def direction(parts: Mapping[str, Sequence[float]]) -> Array | None:
-        found = np.zeros(len(places))
-        for name, vector in parts.items():
-            for axis, x in zip("xyz", vector, strict=True):
-                if f"{name} {axis}" in moves:
-                    found[places.index(f"{name} {axis}")] = x
-                elif abs(x) > 0.0:
-                    return None
-        return found
-
     for place in places:
         yield f"{place} alone", np.array([float(each == place) for each in places])
     rows = {each.name: each for each in case.hardpoints}
@@ -116,10 +105,16 @@ def _candidates(case: Case, moves: Mapping[str, float]) -> Iterator[tuple[str, A
     }
     moving = dict.fromkeys(place.rpartition(" ")[0] for place in places)
     for one in moving:
+        own = [f"{one} {axis}" for axis in "xyz"]
         for other in at:
             along = at[other] - at[one]
-            if (found := direction({one: along.tolist()})) is not None and along.any():
-                yield f"{one} along the line to {other}", found
-    for axis, vector in zip("xyz", np.eye(3).tolist(), strict=True):
-        if (found := direction(dict.fromkeys(moving, vector))) is not None:
-            yield f"all points together along {axis}", found
+            if along.any() and all(
+                place in moves for place, x in zip(own, along, strict=True) if x
+            ):
+                parts = dict(zip(own, along.tolist(), strict=True))
+                direction = np.array([parts.get(place, 0.0) for place in places])
+                yield f"{one} along the line to {other}", direction
+    for axis in "xyz":
+        along = np.array([float(place.endswith(f" {axis}")) for place in places])
+        if along.any():
+            yield f"all points together along {axis}", along
