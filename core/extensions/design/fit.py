@@ -15,14 +15,14 @@ import numpy as np
 
 from ...case.case import PER_TRAVEL, TIME, Case, Output
 from ...case.io.reader_options import CurveOptions
-from ...case.units import ANGLES, Unit
+from ...case.units import ANGLES, SECOND, Unit
 from ...errors import KincheckError, unknown
 from ...harness.suspects import FACTORS
 from ...report.axis import ZERO
 from ...trajectory import Array
 from ..sweep.curves import curves
 from .goals import read_box, read_moves, unit_in_table
-from .identify import Combination, combinations, without_effect
+from .identify import Combination, combinations, source, without_effect
 from .likely import Estimate, most_likely
 from .rig import Rig, RigModel, read_rig, with_scatter
 
@@ -30,8 +30,6 @@ ALPHA = 0.01
 """Data are off, if such ones have a smaller probability."""
 NORMAL = 1.959963984540054
 """Half-width of an interval of 95 % over the deviation."""
-BETTER = 0.5**0.5
-"""What is left of the drawing's deviation, where the rig tells as much."""
 LESS = 2.0 * log(1000.0)
 """A slip is named, if its data are at most a thousand times less likely."""
 MOST_FOUND = 6
@@ -101,12 +99,18 @@ class Prediction:
     """An output that was not measured, at the samples [SI].
 
     Attributes:
-        values, deviations: by rig and drawing; drawing: deviations by the drawing alone.
+        values, spread: by rig and drawing, with their deviations; drawing: deviations by the
+            drawing alone.
     """
 
     values: Array
-    deviations: Array
+    spread: Array
     drawing: Array
+
+    @property
+    def source(self) -> str:
+        """Who tells more of it, over the travel."""
+        return source(float(np.nansum(self.spread)), float(np.nansum(self.drawing)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +163,17 @@ class Fitted:
     def length(self) -> Unit:
         """The unit of the table."""
         return unit_in_table("m", self.rig.case)
+
+    @property
+    def along(self) -> Unit:
+        """The unit of the travel."""
+        return travel_unit(self.rig)
+
+    def told_at(self, prediction: Prediction) -> int:
+        """Return the sample to tell of: the one nearest to design, unless all is known there."""
+        drawn = np.nan_to_num(prediction.drawing)
+        order = np.argsort(np.abs(self.rig.case.sweep.change), kind="stable")
+        return next(int(k) for k in order if drawn[k] > 0.01 * drawn.max())
 
     def unit_of(self, output: str) -> Unit:
         """Return the unit of an output as the table has it."""
@@ -275,20 +290,15 @@ def _offsets(model: RigModel, estimate: Estimate) -> Iterator[Shift]:
     sweep = rig.case.sweep
     slopes = model.by_travel(estimate.u) if sweep.driver != TIME else np.array(np.nan)
     if np.isfinite(slopes).all():
-        turns = rig.case.mechanism.driver(sweep.driver).turns
-        unit = unit_in_table("rad" if turns else "m", rig.case)
         along = -slopes * rig.weights
         travel = np.array([sweep.change[k] for _, k in rig.places])
-        yield Shift("travel zero", along, 0.0, np.inf, unit, 1.0)
+        yield Shift("travel zero", along, 0.0, np.inf, travel_unit(rig), 1.0)
         yield Shift("travel scale", along * travel, 0.0, np.inf, percent, 1.0)
 
 
 def _samples(rig: Rig) -> Iterator[Shift]:
     """Yield each number as a shift of its own."""
-    turns = rig.case.sweep.driver != TIME and rig.case.mechanism.driver(rig.case.sweep.driver).turns
-    along = Unit("s", 1.0, float)
-    if rig.case.sweep.driver != TIME:
-        along = unit_in_table("rad" if turns else "m", rig.case)
+    along = travel_unit(rig)
     for k, (goal, at) in enumerate(rig.places):
         where = rig.case.sweep.values[at] / along.size
         direction = np.zeros(rig.count)
@@ -297,9 +307,17 @@ def _samples(rig: Rig) -> Iterator[Shift]:
         yield Shift(name, direction, 0.0, np.inf, rig.unit(goal), 1.0)
 
 
+def travel_unit(rig: Rig) -> Unit:
+    """Return the unit of the travel as the table has it."""
+    driver = rig.case.sweep.driver
+    if driver == TIME:
+        return SECOND
+    return unit_in_table("rad" if rig.case.mechanism.driver(driver).turns else "m", rig.case)
+
+
 def _sized(shift: Shift, estimate: Estimate) -> Shift:
     size, deviation = estimate.shift(shift.direction)
-    chance = erfc(abs(size / deviation) * BETTER)
+    chance = erfc(abs(size / deviation) * 0.5**0.5)
     return replace(shift, size=size, deviation=deviation, chance=chance)
 
 

@@ -104,14 +104,12 @@ class Fit(OfCase):
 
 def facts(found: Fitted, out: Path | None = None, checked: str | None = None) -> dict[str, Any]:
     """Return the answer as plain data [SI], with standard deviations."""
-    from .fit import BETTER, NORMAL
+    from .fit import NORMAL
+    from .identify import source
 
     def interval(value: float, deviation: float) -> dict[str, Any]:
         half = NORMAL * deviation
         return {"value": value, "deviation": deviation, "interval": [value - half, value + half]}
-
-    def source(deviation: float, drawing: float) -> str:
-        return "from the rig" if deviation < BETTER * drawing else "from the drawing"
 
     def shifted(each: Shift) -> dict[str, Any]:
         about = {"name": each.name, "unit": each.si, "p": each.chance}
@@ -126,15 +124,15 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
         "misfit": found.first.misfit,
         "numbers": rig.count,
         "noise": {
-            goal.output: {"deviation": float(np.median(noise)), "source": source}
-            for goal, noise, source in zip(rig.goals, rig.noise, rig.sources, strict=True)
+            goal.output: {"deviation": float(np.median(noise)), "source": what}
+            for goal, noise, what in zip(rig.goals, rig.noise, rig.sources, strict=True)
         },
         "directions": [
             {
                 "terms": each.terms,
                 **interval(each.value, each.deviation),
                 "drawing": each.drawing,
-                "from": source(each.deviation, each.drawing),
+                "from": each.source,
             }
             for each in found.combinations
         ],
@@ -144,11 +142,11 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
             name: {
                 "travel": rig.case.sweep.values.tolist(),
                 "value": _plain(each.values),
-                "deviation": _plain(each.deviations),
-                "low": _plain(each.values - NORMAL * each.deviations),
-                "high": _plain(each.values + NORMAL * each.deviations),
+                "deviation": _plain(each.spread),
+                "low": _plain(each.values - NORMAL * each.spread),
+                "high": _plain(each.values + NORMAL * each.spread),
                 "drawing": _plain(each.drawing),
-                "from": source(float(np.nansum(each.deviations)), float(np.nansum(each.drawing))),
+                "from": each.source,
             }
             for name, each in found.predictions.items()
         },
@@ -231,7 +229,8 @@ def headline(found: Fitted) -> str:
 
 def _determined(found: Fitted) -> Iterator[str]:
     """Yield what the rig determines: combinations, predictions, offsets, coordinates."""
-    from .fit import BETTER, NORMAL
+    from .fit import NORMAL
+    from .identify import BETTER, source
 
     unit = found.length
     size = NORMAL / unit.size
@@ -246,22 +245,20 @@ def _determined(found: Fitted) -> Iterator[str]:
     yield from (f"  no effect: {each}" for each in found.null)
     if found.idle:
         yield f"  left out, nothing measured follows: {shortened([*found.idle], 6)}"
-    yield "\nPredictions at design, not measured:"
-    k = int(np.abs(found.rig.case.sweep.change).argmin())
+    yield "\nPredictions, not measured:"
     for name, each in found.predictions.items():
-        shown = found.unit_of(name)
+        shown, k = found.unit_of(name), found.told_at(each)
+        where = f"{found.rig.case.sweep.values[k] / found.along.size:.4g} {found.along.name}"
         value, half, drawn = (
-            float(x[k]) / shown.size for x in (each.values, each.deviations, each.drawing)
+            float(x[k]) / shown.size for x in (each.values, each.spread, each.drawing)
         )
-        source = "from the rig" if half < BETTER * drawn else "from the drawing"
         yield (
-            f"  {name}: {value:.5g} ± {NORMAL * half:.2g} {shown.name}, by the drawing alone ±"
-            f" {NORMAL * drawn:.2g}; {source}"
+            f"  {name} at {where}: {value:.5g} ± {NORMAL * half:.2g} {shown.name}, by the"
+            f" drawing alone ± {NORMAL * drawn:.2g}; {each.source}"
         )
     yield "\nOffsets of the rig, beside moved points:"
     yield from (f"  {each.words}" for each in found.shifts if np.isfinite(each.deviation))
     yield f"\nCoordinates, moved from the drawing [{unit.name}]:"
     for place, move in found.moves.items():
         half, box = size * found.deviations[place], size * found.boxes[place]
-        source = "from the rig" if half < BETTER * box else "from the drawing"
-        yield f"  {place}: {move / unit.size:+.3f} ± {half:.3f}; {source}"
+        yield f"  {place}: {move / unit.size:+.3f} ± {half:.3f}; {source(half, box)}"

@@ -18,6 +18,8 @@ all combinations some have little more; of those that can be named none has.
 # Directions of size one are another, if so much is left beside those known.
 _OWN = 1e-3
 MOST_TERMS, LEAST_TERM = 4, 0.1
+BETTER = 0.5**0.5
+"""What is left of the drawing's deviation, where the rig tells as much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,11 @@ class Combination:
     drawing: float
 
     @property
+    def source(self) -> str:
+        """Who tells more of it."""
+        return source(self.deviation, self.drawing)
+
+    @property
     def words(self) -> str:
         """The largest terms as a sum."""
         order = sorted(self.terms.items(), key=lambda each: -abs(each[1]))
@@ -45,6 +52,11 @@ class Combination:
         )
         more = any(abs(x) >= LEAST_TERM for _, x in order[len(shown) :])
         return text.removeprefix("+ ") + " ..." * more
+
+
+def source(deviation: float, drawing: float) -> str:
+    """Return who tells more of a number: the rig, or the drawing."""
+    return "from the rig" if deviation < BETTER * drawing else "from the drawing"
 
 
 def combinations(estimate: Estimate, boxes: Mapping[str, float]) -> list[Combination]:
