@@ -31,15 +31,15 @@ ALPHA = 0.01
 NORMAL = 1.959963984540054
 """Half-width of an interval of 95 % over the deviation."""
 LESS = 2.0 * log(1000.0)
-"""A slip is named, if its data are at most a thousand times less likely."""
+"""Another unit is named, if its data are at most a thousand times less likely."""
 MOST_FOUND = 6
 ROUND_OFF = 1e-9
 """Effects smaller than this part of the largest are none: real ones are a thousand times larger."""
-LONG, LONGEST = 3.0, 121
-"""Times the travel of rig and table, and samples, on which combinations without effect are told."""
 # A linear misfit this many times the mean will not end near it.
 _HOPELESS = 100.0
-_UNKNOWN_SCALE = 0.01
+_UNKNOWN_SCALE = 0.03  # a gauge may be so much off, and be trusted
+# Factors of units of lengths and angles, by parts of their names.
+_LENGTHS, _ANGLES = ("25.4", "0254", "3048"), ("pi",)
 
 
 class Verdict(StrEnum):
@@ -213,28 +213,38 @@ def fit(
         KincheckError: the file or an option makes no sense, or the table does not reach the travel
             of the rig.
     """
-    rig, boxes = read_rig(case, file, options), _boxes(case, drawing, moves)
-    model = rig.model(boxes)
-    start = np.zeros(len(boxes))
+    boxes = _boxes(case, drawing, moves)
+    return fit_rig(read_rig(case, file, options), boxes, free, every=not moves)
+
+
+def fit_rig(
+    rig: Rig, boxes: Mapping[str, float], free: Sequence[str] = (), *, every: bool = False
+) -> Fitted:
+    """Return the most likely moves, as `fit` does.
+
+    Args:
+        boxes: deviation of each place by the drawing [m].
+        every: leave out places that nothing measured follows.
+    """
+    model, start = rig.model(boxes), np.zeros(len(boxes))
     remedy = "leave out the rows of the rig beyond it, or correct the table"
-    rig = with_scatter(rig, model.search.values(start, remedy), file)
+    rig = with_scatter(rig, model.search.values(start, remedy))
     model = rig.model(boxes)
     given = model(start)
     if given is None:
         raise KincheckError(
-            f"{file}: a measured output has no slope by the points of {case.name} at a sample;"
-            " leave its column out"
+            f"{rig.file}: a measured output has no slope by the points of {rig.case.name} at a"
+            " sample; leave its column out"
         )
     # at a drawing with round numbers an effect may be zero by chance
     near = model(np.random.default_rng(0).uniform(-0.5, 0.5, len(boxes))) or given
     size = np.abs(near[1]).max(axis=0)
     idle = [place for place, x in zip(boxes, size, strict=True) if x <= ROUND_OFF * size.max()]
-    idle = [] if moves else idle
-    if idle:
+    if idle and every:
         boxes = {place: box for place, box in boxes.items() if place not in idle}
-        model, start = rig.model(boxes), np.zeros(len(boxes))
+        model = rig.model(boxes)
     if not boxes:
-        raise KincheckError(f"{file}: nothing measured follows a point of {case.name}")
+        raise KincheckError(f"{rig.file}: nothing measured follows a point of {rig.case.name}")
 
     freed = _named(free, [*_offsets(model, _estimate(model, []))])
     first = estimate = _estimate(model, freed)
@@ -252,15 +262,15 @@ def fit(
         estimate = _estimate(model, [*freed, *found])
     at = tests[len(offsets) :]
     worst = max(at, key=lambda each: abs(each.size / each.deviation))
-    slopes = _over_travel(model, estimate.u, case)
+    slopes = _over_travel(model, estimate.u)
     fitted = Fitted(
         *(rig, boxes, first, estimate, offsets),
         [_alone(each, k, [*freed, *found], estimate) for k, each in enumerate(found, len(freed))],
         *(worst.words, slips or [*_slips(model, estimate)], combinations(estimate, boxes)),
-        *([], idle, predictions(model, estimate)),
+        *([], idle if every else [], predictions(model, estimate)),
     )
     box = np.array([*boxes.values()])
-    return replace(fitted, null=without_effect(slopes, case, fitted.moves, box))
+    return replace(fitted, null=without_effect(slopes, rig.case, fitted.moves, box))
 
 
 def _boxes(case: Case, drawing: str, moves: Sequence[str]) -> dict[str, float]:
@@ -345,7 +355,10 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
     slips = dict[str, Rig]()
     for goal in rig.goals:
         slips[f"{goal.output} negated"] = rig.times({goal.output: -1.0})
+        others = _LENGTHS if goal.unit[0] in ANGLES else _ANGLES
         for name, factor in FACTORS.items():
+            if any(each in name for each in others):
+                continue
             slips[f"{goal.output} times {name}"] = rig.times({goal.output: factor})
     for one, other in pairs(rig.goals, 2):
         if one.unit == other.unit and one.at.tolist() == other.at.tolist():
@@ -353,8 +366,7 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
             goals = [replace(g, middle=middle.get(g.output, g.middle)) for g in rig.goals]
             slips[f"{one.output} and {other.output} exchanged"] = replace(rig, goals=goals)
     if rig.case.sweep.driver != TIME:
-        sweep = rig.case.sweep
-        slips["travel negated"] = replace(rig, case=rig.at(2.0 * sweep.design - sweep.values))
+        slips["travel negated"] = replace(rig, case=rig.back)
     fits = list[tuple[float, Slip]]()
     for name, slipped in slips.items():
         changed = slipped.model(box)
@@ -373,7 +385,9 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
     best = min([each for each, _ in fits], default=np.inf)
     if estimate.probability >= ALPHA:
         best = estimate.evidence
-    yield from (slip for each, slip in fits if each <= best + LESS)
+    for each, slip in fits:
+        if " times " not in slip.name or each <= best + LESS:
+            yield slip
 
 
 def _linear_misfit(estimate: Estimate) -> float:
@@ -383,16 +397,14 @@ def _linear_misfit(estimate: Estimate) -> float:
     return float(left @ left)
 
 
-def _over_travel(model: RigModel, u: Array, table: Case) -> Array:
+def _over_travel(model: RigModel, u: Array) -> Array:
     """Return slopes of what was measured over a long travel as far as it is reached, each row of
     size one: what has no effect over a part of the travel has none anywhere, and a longer part
     tells it better from a small effect.
     """
     rig, search = model.rig, model.search
-    every = np.concatenate([rig.case.sweep.change, table.sweep.change])
-    travel = rig.case.sweep.design + np.linspace(LONG * every.min(), LONG * every.max(), LONGEST)
-    names = search.names
-    found = curves(rig.at(travel), search.places, (u * search.box)[None], names, names)
+    names, places = search.names, search.places
+    found = curves(rig.long, places, (u * search.box)[None], names, names)
     kept = list[Array]()
     for name in names:
         rows = found.slopes[name][0] * search.box

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import numpy as np
 
 from ...case.io.reader_options import CurveOptions
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
-from ...errors import refuse, shortened
+from ...errors import refuse
 from ...options import destination, group, json_file, option, options
 from .new_table import require_new, table_of, write_new
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from .fit import Fitted, Shift
 
 DRAWING = "+- 2 mm"
-MOST_SLIPS, MOST_COMBINATIONS = 8, 12
 
 
 @options
@@ -80,8 +78,10 @@ class Fit(OfCase):
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ...case.io.atomic_files import write
+        from ...report.sections import print_report
         from ...report.terminal import with_json
         from .fit import Verdict
+        from .fit_views import page, report
 
         require_new(self.out)
         refuse(self.unwritable())
@@ -91,11 +91,9 @@ class Fit(OfCase):
         if fits and self.out is not None:
             checked = write_new(self.out, case, file, self.supplied, found.moves, registry)
         if self.page is not None:
-            from .fit_page import page
-
             write("--page", self.page, page(found).encode())
         with with_json(facts(found, self.out if fits else None, checked), self.json) as console:
-            print(*_lines(found), sep="\n", file=console.file)
+            print_report(report(found), cast(TextIO, console.file))
             if fits and self.out is not None:
                 by = f"solved again by {checked}" if checked else "no other engine is installed"
                 print(f"\n{self.out}: written, {by}", file=console.file)
@@ -178,87 +176,3 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
 def _plain(values: Array) -> list[float | None]:
     """Return numbers, None for those that are unknown."""
     return [x if np.isfinite(x) else None for x in values.tolist()]
-
-
-def _lines(found: Fitted) -> Iterator[str]:
-    from .fit import ALPHA, Verdict
-
-    rig, first, estimate = found.rig, found.first, found.estimate
-    slips = [f"{each.name} (p {each.chance:.2g})" for each in found.slips]
-    yield f"{rig.case.name}: {headline(found)}"
-    outputs = ", ".join(goal.output for goal in rig.goals)
-    yield (
-        f"  {rig.count} numbers of {outputs}: misfit {first.misfit:.1f}, p {first.probability:.2g},"
-        f" {first.rounds} rounds"
-    )
-    for goal, noise, source in zip(rig.goals, rig.noise, rig.sources, strict=True):
-        unit = rig.unit(goal)
-        yield f"  noise of {goal.output}: {np.median(noise) / unit.size:.2g} {unit.name}, {source}"
-    yield from (f"  note: {each}" for each in rig.notes)
-    off = found.verdict is Verdict.OFF
-    if off and not found.found and slips:
-        yield f"  fits with: {shortened(slips, MOST_SLIPS)}"
-    if estimate.probability < ALPHA:
-        yield "  no estimate is given, since nothing fits; correct the file, or the table"
-        return
-    if found.found:
-        yield (
-            f"  fits without: {'; '.join(each.words for each in found.found)}; p"
-            f" {estimate.probability:.2g}. Correct the file, or say"
-            f' --free "{found.found[0].name}" for a zero or scale. Below, they are taken out.'
-        )
-    yield from (f"  also fits: {each}" for each in slips[:MOST_SLIPS])
-    for each in found.loose:
-        yield f"  also fits: {each.words}, which the rig cannot tell from moved points"
-    yield "All ± below are intervals of 95 %."
-    yield from _determined(found)
-
-
-def headline(found: Fitted) -> str:
-    """Return the verdict in words."""
-    from .fit import Verdict
-
-    others = [*(each.name for each in found.slips), *(each.name for each in found.loose)]
-    if found.verdict is Verdict.OTHERS:
-        return f"fits, but so does {shortened(others, 3)}"
-    if found.verdict is Verdict.OFF:
-        where = [each.words for each in found.found] or [found.worst]
-        return f"does not fit, off at {'; '.join(where)}"
-    return str(found.verdict)
-
-
-def _determined(found: Fitted) -> Iterator[str]:
-    """Yield what the rig determines: combinations, predictions, offsets, coordinates."""
-    from .fit import NORMAL
-    from .identify import BETTER, source
-
-    unit = found.length
-    size = NORMAL / unit.size
-    known = [each for each in found.combinations if each.deviation < BETTER * each.drawing]
-    yield (
-        f"\n{len(known)} of {len(found.boxes)} combinations are known better by the rig than by the"
-        f" drawing, {len(found.null)} have no effect on what it measured [{unit.name}]:"
-    )
-    for each in known[:MOST_COMBINATIONS]:
-        value, half = each.value / unit.size, size * each.deviation
-        yield f"  {each.words}: {value:+.3f} ± {half:.3f}, drawing ± {size * each.drawing:.3f}"
-    yield from (f"  no effect: {each}" for each in found.null)
-    if found.idle:
-        yield f"  left out, nothing measured follows: {shortened([*found.idle], 6)}"
-    yield "\nPredictions, not measured:"
-    for name, each in found.predictions.items():
-        shown, k = found.unit_of(name), found.told_at(each)
-        where = f"{found.rig.case.sweep.values[k] / found.along.size:.4g} {found.along.name}"
-        value, half, drawn = (
-            float(x[k]) / shown.size for x in (each.values, each.spread, each.drawing)
-        )
-        yield (
-            f"  {name} at {where}: {value:.5g} ± {NORMAL * half:.2g} {shown.name}, by the"
-            f" drawing alone ± {NORMAL * drawn:.2g}; {each.source}"
-        )
-    yield "\nOffsets of the rig, beside moved points:"
-    yield from (f"  {each.words}" for each in found.shifts if np.isfinite(each.deviation))
-    yield f"\nCoordinates, moved from the drawing [{unit.name}]:"
-    for place, move in found.moves.items():
-        half, box = size * found.deviations[place], size * found.boxes[place]
-        yield f"  {place}: {move / unit.size:+.3f} ± {half:.3f}; {source(half, box)}"

@@ -28,6 +28,8 @@ SCATTER = 2.0
 """Scatter this many times the noise of the digits is noise of the rig."""
 # The median of absolute values of normal numbers, and the width of evenly spread rounding.
 _MEDIAN, _EVEN = 0.6744897501960817, 3.0**-0.5
+LONG, LONGEST = 3.0, 121
+"""Times the travel of rig and table, and samples, on which combinations without effect are told."""
 STEP = 1e-4
 """Step of the travel for slopes by it [m or rad]: round-off and curvature change them by 1e-8."""
 
@@ -37,14 +39,22 @@ class Rig:
     """What a rig measured.
 
     Attributes:
+        file: of the numbers.
         case: at the samples of the rig.
+        near: the case at travels a step beyond these, then a step before.
+        back: the case at these travels with the other sign.
+        long: the case over a long travel, on which combinations without effect are told.
         goals: of each output: its samples, and the numbers measured [SI]; a tolerance of one.
         noise: deviation of the numbers of each output [SI].
         sources: of the noise of each output, in words.
         notes: on how the file was read.
     """
 
+    file: Path
     case: Case
+    near: Case
+    back: Case
+    long: Case
     goals: Sequence[Goal]
     noise: Sequence[Array]
     sources: Sequence[str]
@@ -87,10 +97,6 @@ class Rig:
             noise=[abs(a) * each for each, a in zip(self.noise, scale, strict=True)],
         )
 
-    def at(self, travel: Array) -> Case:
-        """Return the case at other travels."""
-        return replace(self.case, sweep=replace(self.case.sweep, values=travel), reference={})
-
     def model(self, boxes: Mapping[str, float]) -> RigModel:
         """Return the numbers of designs less those measured; see `likely`."""
         return RigModel(self, Search(self.case, self.goals, boxes))
@@ -109,17 +115,12 @@ class RigModel:
         weights = self.rig.weights
         return (found[0] * weights, found[1] * weights[:, None]) if found else None
 
-    @cached_property
-    def _near(self) -> Case:
-        values = self.rig.case.sweep.values
-        return self.rig.at(np.concatenate([values + STEP, values - STEP]))
-
     def by_travel(self, u: Array) -> Array:
         """Return the slopes of the numbers by the travel [SI]; NaN if a sample near is not
         reached.
         """
         search = self.search
-        found = curves(self._near, search.places, (u * search.box)[None], search.names)
+        found = curves(self.rig.near, search.places, (u * search.box)[None], search.names)
         ends = {name: values[0].reshape(2, -1) for name, values in found.values.items()}
         slopes = {name: (a - b) / (2.0 * STEP) for name, (a, b) in ends.items()}
         return self.rig.of(slopes)
@@ -146,10 +147,21 @@ def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
         goals.append(Goal(*named, at, series.position[at], 1.0))
         noise.append(np.hypot(digits, stated))
         sources.append("as stated" if stated else "printed digits")
-    return Rig(replace(found, reference={}), goals, noise, sources, notes)
+    at = found.sweep.values
+    every = np.concatenate([found.sweep.change, case.sweep.change])
+    ends = np.linspace(LONG * every.min(), LONG * every.max(), LONGEST)
+    travels = [
+        *(at, np.concatenate([at + STEP, at - STEP]), 2.0 * found.sweep.design - at),
+        found.sweep.design + ends,
+    ]
+    cases = [
+        replace(found, sweep=replace(found.sweep, values=values), reference={})
+        for values in travels
+    ]
+    return Rig(file, *cases, goals, noise, sources, notes)
 
 
-def with_scatter(rig: Rig, drawn: Mapping[str, Array], file: Path) -> Rig:
+def with_scatter(rig: Rig, drawn: Mapping[str, Array]) -> Rig:
     """Return the rig with the noise of outputs whose samples scatter far beyond their digits, as
     they scatter about a smooth difference from the curve of the drawing.
 
@@ -174,7 +186,7 @@ def with_scatter(rig: Rig, drawn: Mapping[str, Array], file: Path) -> Rig:
         if not noise[k].all():
             unit = rig.unit(goal)
             raise KincheckError(
-                f"{file}: {goal.output} has all digits, so its noise is not known; state it:"
+                f"{rig.file}: {goal.output} has all digits, so its noise is not known; state it:"
                 f' --accuracy "{goal.output}=0.01 {unit.name}"'
             )
     return replace(rig, noise=noise, sources=sources)

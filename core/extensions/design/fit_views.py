@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
+from ...errors import number_of, shortened
 from ...harness.scene import scene
 from ...report.axis import Axis
 from ...report.drawing import Drawing, drawing
@@ -16,8 +18,7 @@ from ...report.page_model import Plot
 from ...report.sections import Diagram, Report, Section, environment, figure_parts
 from ...trajectory import Array
 from ...unit_text import with_unit
-from .fit import ALPHA, NORMAL, Fitted
-from .fit_command import headline
+from .fit import ALPHA, NORMAL, Fitted, Verdict
 from .goals import Goal
 from .identify import BETTER, Combination
 
@@ -29,31 +30,70 @@ _RIG, _FIT, _DRAWING = (
 )
 
 
-def page(found: Fitted) -> str:
-    """Return the page as one HTML file."""
-    rig = found.rig
+def headline(found: Fitted) -> str:
+    """Return the verdict in words."""
+    if found.verdict is Verdict.OTHERS:
+        others = [each.name for each in (*found.slips, *found.loose)]
+        return f"fits, but so does {shortened(others, 3)}"
+    if found.verdict is Verdict.OFF:
+        where = [each.words for each in found.found] or [found.worst]
+        return f"does not fit, off at {'; '.join(where)}"
+    return str(found.verdict)
+
+
+def report(found: Fitted) -> Report:
+    """Return what the rig says: the verdict first, then what it determines, if anything fits."""
+    rig, first = found.rig, found.first
     facts = [
         f"{rig.count} numbers of {', '.join(goal.output for goal in rig.goals)}",
-        f"p {found.first.probability:.2g}",
-        "± and bands are intervals of 95 %",
+        f"misfit {first.misfit:.1f}, p {first.probability:.2g}, {number_of(first.rounds, 'round')}",
+        "± is 95 %",
     ]
-    slips = [f"Also fits: {each.name}, p {each.chance:.2g}." for each in found.slips]
-    slips += [f"Also fits: {each.words}." for each in found.loose]
-    sections = [Section("Verdict", [f"{headline(found)}.", *slips], rig.notes, [], 0, [])]
-    sections.append(Section("Curves and residuals", [], [], [], 0, [], _curves(found)))
-    drawn, times = _moves(found)
+    sections = [_verdict(found)]
     if found.estimate.probability >= ALPHA:
-        sections += [_combinations(found), _predictions(found), _coordinates(found)]
-    report = Report("fit", f"{rig.case.name}: {found.verdict}", facts, sections)
+        sections += [_combinations(found), _predictions(found), _offsets(found)]
+        sections.append(_coordinates(found))
+    return Report("fit", f"{rig.case.name}: {headline(found)}", facts, sections)
+
+
+def page(found: Fitted) -> str:
+    """Return the page as one HTML file: the report, with pictures."""
+    whole = report(found)
+    first, *others = whole.sections
+    curves = Section("Curves and residuals", [], [], [], 0, [], _curves(found))
+    drawn, times = _moves(found)
+    whole = replace(whole, sections=[first, curves, *others])
     figures = {
-        diagram.plot.figure: diagram.figure for section in sections for diagram in section.diagrams
+        diagram.plot.figure: diagram.figure
+        for section in whole.sections
+        for diagram in section.diagrams
     }
     known = environment(Path(__file__).parent)
     parts = figure_parts(figures, scenes={"moves": msgspec.to_builtins(drawn)})
-    whole = known.get_template("bench.html").render(report=report, scripted=True, **parts)
-    return whole.replace(
-        "</main>", known.get_template("fit_scene.html").render(times=times) + "</main>", 1
-    )
+    text = known.get_template("bench.html").render(report=whole, scripted=True, **parts)
+    moves = known.get_template("fit_scene.html").render(times=times)
+    return text.replace("</main>", f"{moves}</main>", 1)
+
+
+def _verdict(found: Fitted) -> Section:
+    rig, verdict = found.rig, list[str]()
+    if found.found:
+        verdict.append(
+            f"Fits without {'; '.join(each.words for each in found.found)}, p"
+            f" {found.estimate.probability:.2g}. Correct the file, or say --free"
+            f' "{found.found[0].name}" for a zero or scale. Below, they are taken out.'
+        )
+    what = "Fits with" if found.verdict is Verdict.OFF and not found.found else "Also fits:"
+    verdict += [f"{what} {each.name}, p {each.chance:.2g}." for each in found.slips]
+    verdict += [f"{what} {each.words}; moved points do the same." for each in found.loose]
+    if found.estimate.probability < ALPHA:
+        verdict.append("Nothing is estimated, since the table does not fit.")
+    notes = [
+        f"Noise of {goal.output}: {np.median(noise) / unit.size:.2g} {unit.name}, {source}."
+        for goal, noise, source in zip(rig.goals, rig.noise, rig.sources, strict=True)
+        for unit in [rig.unit(goal)]
+    ]
+    return Section("Verdict", verdict, [*notes, *rig.notes], [], 0, [])
 
 
 def _curves(found: Fitted) -> list[Diagram]:
@@ -131,6 +171,8 @@ def _combinations(found: Fitted) -> Section:
     verdict = [f"{known} of {len(every)} are known better by the rig than by the drawing."]
     verdict += [f"{len(every) - len(told)} are known by the drawing alone, and not listed."]
     verdict += [f"No effect on what was measured: {each}." for each in found.null]
+    if found.idle:
+        verdict.append(f"Left out, nothing measured follows: {shortened([*found.idle], 6)}.")
     heads = ["", "combination", f"moved [{unit.name}]", "±", "± by the drawing", "source"]
     title = "Combinations of moves"
     diagram = Diagram(plot, {"data": [bars], "layout": layout}, [style])
@@ -152,6 +194,17 @@ def _predictions(found: Fitted) -> Section:
         rows.append([with_unit(name, unit.name), where, *texts, each.source])
     heads = ["output", "at", "value", "±", "± by the drawing", "source"]
     return Section("Predictions, not measured", [], [], heads, 2, rows)
+
+
+def _offsets(found: Fitted) -> Section:
+    rows = [
+        [each.name, *(f"{x / each.unit.size:.3g}" for x in numbers), each.unit.name]
+        for each in found.shifts
+        if np.isfinite(each.deviation)
+        for numbers in [(each.size, NORMAL * each.deviation)]
+    ]
+    heads = ["what the rig reads too much", "size", "±", "unit"]
+    return Section("Offsets of the rig, beside moved points", [], [], heads, 1, rows)
 
 
 def _coordinates(found: Fitted) -> Section:
