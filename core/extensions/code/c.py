@@ -70,7 +70,7 @@ int {n}_move(void *state, double driver, double rate, double *outputs) {{
   int failed;
   if (!isfinite(goal) || !isfinite(r) || !(s[SIZE + PARAMETERS] > 0.0)) return 1;
   copy(w, s);
-  failed = travel(w, n, goal);
+  failed = travel(w, n, goal, HALVINGS);
   if (failed) return failed;
   copy(s, w);
   tell(s, outputs, r);
@@ -170,7 +170,7 @@ def source(solved: SolvedCase, name: str) -> str:
             *numbers,
             *lines,
             "",
-            C.text(steps_text(solved)).replace("SCRATCH", "double c[12];"),
+            C.text(steps_text(solved)),
             tail.format(
                 n=name,
                 outputs=outputs,

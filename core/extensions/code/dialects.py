@@ -18,6 +18,10 @@ from ...program import Program
 from ...unit_text import with_unit
 from .solved import CodeOutput, SolvedCase
 
+PIECE = 500
+"""Operations of a function: compilers of JavaScript leave long functions slow, and those of C take
+long for them.
+"""
 OPERATIONS = {
     "+": "({0} + {1})",
     "-": "({0} - {1})",
@@ -44,13 +48,16 @@ class Dialect:
     Attributes:
         words: words of the text, and those of the language in their place.
         table: declaration of a table, of its kind, name and numbers.
+        scratch: declaration of room for numbers, of a name and their count.
     """
 
     words: dict[str, str]
     table: str
+    scratch: str
 
     def text(self, text: str) -> str:
         """Return a text of the steps in this language."""
+        text = re.sub(r"SCRATCH\((\w), (\d+)\);", self.scratch, text)
         return re.sub(r"\b[A-Za-z]\w*\b", lambda word: self.words.get(word[0], word[0]), text)
 
 
@@ -68,6 +75,7 @@ C = Dialect(
         "NOTHING": "NAN",
     },
     "static const {kind} {name}[] = {{{numbers}}};",
+    r"double \1[\2];",
 )
 JAVASCRIPT = Dialect(
     {
@@ -86,6 +94,7 @@ JAVASCRIPT = Dialect(
         **{name: f"Math.{name}" for name in ("sqrt", "sin", "cos", "atan2", "floor")},
     },
     "const {name} = [{numbers}];",
+    r"const \1 = new Float64Array(\2);",
 )
 
 STEPS = """
@@ -121,8 +130,9 @@ ACTION begin(LANE s) {
   s[EARLIER] = s[HERE];
 }
 
-/* lane w to time t by as many steps as it takes, halved where one fails; n is for attempts */
-ANSWER travel(LANE w, LANE n, NUMBER goal) {
+/* lane w to time t by as many steps as it takes, halved so many times where one fails; n is for
+   attempts */
+ANSWER travel(LANE w, LANE n, NUMBER goal, WHOLE most) {
   VALUE step = goal - w[AT];
   COUNT halvings = 0;
   for (COUNT k = 0; w[AT] != goal; k++) {
@@ -139,7 +149,7 @@ ANSWER travel(LANE w, LANE n, NUMBER goal) {
     } else {
       step = 0.5 * step;
       halvings = halvings + 1;
-      if (halvings > 40 || k > 20000 || !(fabs(step) > 0.0)) {
+      if (halvings > most || k > 20000 || !(fabs(step) > 0.0)) {
         return w[SIGMA] < 0.1 * w[LARGEST] ? 2 : failed;
       }
     }
@@ -163,20 +173,59 @@ ANSWER assemble(LANE s) {
 
 
 def program_text(name: str, program: Program) -> str:
-    """Return a program as a function of a lane."""
-    repeated = program.times > 1
+    """Return a program as a function of a lane, in pieces if it is long."""
+    if program.times > 1:
+        return _repeated(name, program)
+    nodes, worked = program.nodes, [k for k, (op, *_) in enumerate(program.nodes) if op in OPERATIONS]
+    pieces = [worked[k : k + PIECE] for k in range(0, len(worked), PIECE)]
+    at = {k: number for number, piece in enumerate(pieces) for k in piece}
+    last = len(pieces) - 1
+    outputs = program.outputs.values()
+    # what a later piece reads, or the last lines where there are several
+    kept = [x for k in worked for x in map(int, nodes[k][1:]) if at.get(x, at[k]) != at[k]]
+    kept += [k for k in outputs if at.get(k, last) != last]
+    place = {k: number for number, k in enumerate(dict.fromkeys(kept))}
+    functions: list[str] = []
+    for number, piece in enumerate(pieces or [[]]):
+        needed = [x for k in piece for x in map(int, nodes[k][1:])]
+        needed += outputs if number == max(last, 0) else ()
+        lines = [
+            f"REAL v{k} = {f't[{place[k]}]' if k in at else _given(nodes[k])};"
+            for k in dict.fromkeys(needed)
+            if at.get(k) != number
+        ]
+        for k in piece:
+            op, *read = nodes[k]
+            lines.append(f"REAL v{k} = {OPERATIONS[op].format(*(f'v{int(x)}' for x in read))};")
+            if k in place:
+                lines.append(f"t[{place[k]}] = v{k};")
+        if number < last:
+            functions.append(_function(f"ACTION {name}_{number}(LANE s, LANE t)", lines))
+            continue
+        before = [f"{name}_{k}(s, t);" for k in range(last)]
+        before = [f"SCRATCH(t, {max(1, len(place))});", *before] if before else []
+        writes = [f"s[{slot}] = v{k};" for slot, k in program.outputs.items()]
+        functions.append(_function(f"ACTION {name}(LANE s)", [*before, *lines, *writes]))
+    return "\n\n".join(functions)
+
+
+def _given(node: Sequence[object]) -> str:
+    """Return the text of a number that is not computed."""
+    op, value = node
+    return f"s[{value}]" if op == "input" else _constant(float(str(value)))
+
+
+def _repeated(name: str, program: Program) -> str:
+    """Return the function of a program that runs over neighbouring slots, and keeps the largest."""
     lines: list[str] = []
     for k, (op, *read) in enumerate(program.nodes):
         if op == "input":
-            value = f"s[{int(read[0])}{' + k' if repeated else ''}]"
+            value = f"s[{int(read[0])} + k]"
         elif op == "const":
             value = _constant(float(read[0]))
         else:
             value = OPERATIONS[op].format(*(f"v{int(x)}" for x in read))
         lines.append(f"REAL v{k} = {value};")
-    if not repeated:
-        lines += [f"s[{slot}] = v{k};" for slot, k in program.outputs.items()]
-        return "\n".join([f"ACTION {name}(LANE s) {{", *(f"  {each}" for each in lines), "}"])
     largest = [f"VALUE m{slot} = 0.0;" for slot in program.outputs]
     lines += [
         f"if (v{k} > m{slot} || v{k} != v{k}) m{slot} = v{k};"
@@ -305,7 +354,7 @@ def steps_text(solved: SolvedCase) -> str:
         ]
         parts.append(_function("ACTION move_geometry(LANE s, WHOLE which, NUMBER change)", moved))
     own = ["VALUE x;"] if any(line.startswith("x =") for line in told) else []
-    own += ["SCRATCH"] if any(each.completion for each in solved.outputs) else []
+    own += ["SCRATCH(c, 12);"] if any(each.completion for each in solved.outputs) else []
     parts += [steps, _function("ACTION tell(FROM s, LANE out, NUMBER r)", [*own, *told])]
     return "\n\n".join(parts)
 

@@ -8,7 +8,7 @@ lane holds the slots of the programs, then the numbers of `Tail`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,11 +35,14 @@ from ...kinematics.compiled.request import (
 from ...mechanism.motions import Absolute, Motion, Ramp, Sine
 from ...program import DONE, MARGIN, Program, Tape, program, where_larger
 from ...trajectory import QUANTITIES
-from ..sweep.curves import prepare_curves
+from ..sweep.curves import moved_by
 from ..sweep.varied_places import Geometry
 
 TOL = 1e-12
 """Largest accepted residual, as of `kincheck run`."""
+HALVINGS = 40
+"""Most halvings of a step in a row: what is left of it is no step in double precision."""
+NONE = np.empty((0, 0))
 SMALL = 1e-4
 """Square of the sine of half an angle below which three terms of the series of an angle over its
 sine give all digits: the fourth is 35/576 of its cube.
@@ -93,6 +96,8 @@ class SolvedCase:
     parameters: Sequence[Parameter]
     begin: float
     """Time at which the mechanism is at its design position [s]."""
+    poses: Mapping[str, Sequence[int]] = field(default_factory=dict[str, Sequence[int]])
+    """Slots of origin [m] and Euler parameters, by body."""
 
     @property
     def size(self) -> int:
@@ -144,6 +149,7 @@ class SolvedCase:
             "SIZE": self.size,
             "AT": self.at,
             "MOST": plan.most,
+            "HALVINGS": HALVINGS,
             "TOLERANCE": plan.tolerance,
             "ASSEMBLING": ASSEMBLING,
             "CLOSED": CLOSED,
@@ -173,11 +179,12 @@ class SolvedCase:
         return found
 
 
-def solved_case(case: Case, places: Sequence[str]) -> SolvedCase:
+def solved_case(case: Case, places: Sequence[str], bodies: Sequence[str] = ()) -> SolvedCase:
     """Return a case ready to be written as code.
 
     Args:
         places: names of the parameters, see `kincheck.curves`.
+        bodies: names of those whose poses are wanted.
 
     Raises:
         KincheckError: the case has a part that the code cannot have, or a place is unknown.
@@ -198,17 +205,8 @@ def solved_case(case: Case, places: Sequence[str]) -> SolvedCase:
             " output of the motion."
         )
     case = replace(case, outputs=measured)
-    parameters: list[Parameter] = []
-    if places:
-        ready = prepare_curves(case, places)
-        varied = [*ready.outputs.designs.route.model.varied]
-        made = DesignOutputs.of(case, varied, derivative=2)
-        slots, geometry = made.designs.route.model.geometry, Geometry(case)
-        for k, (name, unit) in enumerate(ready.units.items()):
-            moves = {slots[i]: float(x) for i, x in enumerate(ready.moves[:, k]) if x}
-            parameters.append(Parameter(name, unit, _nominal(geometry, name), moves))
-    else:
-        made = DesignOutputs.of(case, (), derivative=2)
+    varied, _, moves, units = moved_by(case, places) if places else ((), NONE, NONE, {})
+    made = DesignOutputs.of(case, varied, derivative=2, bodies=bodies)
     route = made.designs.route
     if route.begin.lead is not None:
         raise KincheckError(
@@ -216,11 +214,19 @@ def solved_case(case: Case, places: Sequence[str]) -> SolvedCase:
             " so that they have their design values at one time."
         )
     model, kept = route.model, len(route.model.slots) + 1
+    geometry, parameters = Geometry(case), list[Parameter]()
+    for k, (name, unit) in enumerate(units.items()):
+        moved = {model.geometry[i]: float(x) for i, x in enumerate(moves[:, k]) if x}
+        parameters.append(Parameter(name, unit, _nominal(geometry, name), moved))
     outputs: list[CodeOutput] = []
     for each in measured:
         outputs.append(found := _output(model, each, kept))
         kept += 4 if found.completion else 1 if found.period else 0
-    return SolvedCase(case, model, outputs, parameters, route.begin.time)
+    poses = {
+        name: [slot for part in "rp" for slot in model.plan.kept[model.rows[f"{part} {name}"]]]
+        for name in bodies
+    }
+    return SolvedCase(case, model, outputs, parameters, route.begin.time, poses)
 
 
 def _nominal(geometry: Geometry, name: str) -> float:
