@@ -176,7 +176,10 @@ def program_text(name: str, program: Program) -> str:
     """Return a program as a function of a lane, in pieces if it is long."""
     if program.times > 1:
         return _repeated(name, program)
-    nodes, worked = program.nodes, [k for k, (op, *_) in enumerate(program.nodes) if op in OPERATIONS]
+    nodes, worked = (
+        program.nodes,
+        [k for k, (op, *_) in enumerate(program.nodes) if op in OPERATIONS],
+    )
     pieces = [worked[k : k + PIECE] for k in range(0, len(worked), PIECE)]
     at = {k: number for number, piece in enumerate(pieces) for k in piece}
     last = len(pieces) - 1

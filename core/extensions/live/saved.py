@@ -34,6 +34,7 @@ and readers take a design that is so near.
 LINEAR = 1e-12
 """Largest distance of a place from where the solver moves it [m], of directions without unit."""
 
+SOLVER = "return { Mechanism, DESIGN, HALVINGS };"
 COLUMNS = "name,x,y,z\n"
 Leaf: TypeAlias = tuple[str | int, ...]
 
@@ -67,7 +68,7 @@ def saved_page(live: LiveTable) -> str:
     known = msgspec.json.encode(saved).decode()
     scripts = [
         f"const SAVED = {known};",
-        f"const solver = (() => {{\n{source(solved)}\nreturn {{ Mechanism, DESIGN, HALVINGS }};\n}})();",
+        f"const solver = (() => {{\n{source(solved)}\n{SOLVER}\n}})();",
         page_script("solver.js"),
     ]
     # no text in a script may end it
@@ -112,7 +113,7 @@ def _scene(
     """
     drawing = live.solve(Solve(points=live.positions)).drawing
     numbers = {body["name"]: k for k, body in enumerate(drawing["bodies"])}
-    at_design, geometry = dict(_leaves(_design(live, live.case))), geometry_of(live.case)
+    at_design = dict(_leaves(_design(live, live.case)))
     unit = unit_of(live.table, live.supplied.units).size
     changes, structure = dict[Leaf, list[tuple[int, float]]](), structure_of(live.case)
     nominal = {name: np.array(value) for name, value in places(live.case.mechanism).items()}
@@ -128,10 +129,11 @@ def _scene(
             for name, value in nominal.items()
         }
         off = geometry_of(case)[:, 0] - np.concatenate([*expected.values()])
-        if structure_of(case) != structure or np.abs(off).max() > LINEAR or {*moved} != {*at_design}:
+        is_linear = structure_of(case) == structure and np.abs(off).max() <= LINEAR
+        if not is_linear or {*moved} != {*at_design}:
             raise KincheckError(
-                f"--save: {live.names[row]} {'xyz'[axis]} changes more than places of the mechanism,"
-                " which a saved page cannot follow. Leave --save out: the served page can."
+                f"--save: {live.names[row]} {'xyz'[axis]} changes more than places of the"
+                " mechanism, and a saved page cannot follow. Leave --save out: a served page can."
             )
         for leaf, value in at_design.items():
             if moved[leaf] != value:
