@@ -10,6 +10,8 @@ from ...case.case import Case
 from .dialects import C, steps_text, tables, words_of
 from .solved import SolvedCase, solved_case
 
+REALS = ("START", "NOMINAL")
+"""The tables that are not of whole numbers."""
 HEADER = """\
 /* {case}: {source}
  * Written by kincheck. Each output has three numbers, in the order of the outputs: its value,
@@ -147,12 +149,11 @@ def source(solved: SolvedCase, name: str) -> str:
     """Return the source."""
     numbers = [f"#define {key} {value!r}" for key, value in solved.numbers.items()]
     known = tables(solved)
-    numbers.append(f"#define CARRIED {len(known['CARRY_TO'])}")
     if solved.parameters:
         known["NOMINAL"] = [each.nominal for each in solved.parameters]
     lines = [
         C.table.format(
-            kind="int" if table.startswith("CARRY") else "double",
+            kind="double" if table in REALS else "int",
             name=table,
             numbers=", ".join(map(repr, values)),
         )

@@ -130,13 +130,14 @@ ACTION begin(LANE s) {
   s[EARLIER] = s[HERE];
 }
 
+BETTER_ROWS
 /* lane w to time t by as many steps as it takes, halved so many times where one fails; n is for
    attempts */
 ANSWER travel(LANE w, LANE n, NUMBER goal, WHOLE most) {
   VALUE step = goal - w[AT];
   COUNT halvings = 0;
   for (COUNT k = 0; w[AT] != goal; k++) {
-    VALUE to = w[AT] + step;
+    TRY_BETTER_ROWSVALUE to = w[AT] + step;
     if (step > 0.0 ? to > goal : to < goal) to = goal;
     COUNT failed = attempt(n, w, to);
     if (failed == 0) {
@@ -157,6 +158,37 @@ ANSWER travel(LANE w, LANE n, NUMBER goal, WHOLE most) {
   return 0;
 }
 """
+BETTER_ROWS = """
+/* lane w at its pose with another choice of the independent rows, in lane n: 1 if it stands there,
+   and these are far from dependent */
+ANSWER renew(LANE n, FROM w, NUMBER choice) {
+  for (COUNT k = 0; k < SIZE; k++) n[k] = 0.0;
+  for (COUNT k = 0; k < STAYING; k++) n[STANDING[k]] = w[STANDING[k]];
+  n[CHOICE] = choice;
+  sample(n, w[AT]);
+  PREPARE
+  for (COUNT k = 0; k < ASSEMBLING; k++) {
+    newton(n);
+    if (!(n[RESIDUAL] > CLOSED)) break;
+  }
+  begin(n);
+  VALUE moved = 0.0;
+  for (COUNT k = 0; k < POSE; k++) {
+    VALUE far = fabs(n[STANDING[k]] - w[STANDING[k]]);
+    if (far > moved) moved = far;
+  }
+  if (!(n[CLOSURE] <= CLOSED && n[LEFTOVER] <= CONSISTENT && n[BRANCH] > 0.0)) return 0;
+  if (!(moved <= NEAR * n[SIGMA] && n[SIGMA] > BETTER * w[SIGMA])) return 0;
+  if (n[LARGEST] < w[LARGEST]) n[LARGEST] = w[LARGEST];
+  if (n[LARGEST_NOW] < w[LARGEST]) n[LARGEST_NOW] = w[LARGEST];
+  return 1;
+}
+
+"""
+TRY_BETTER_ROWS = """for (COUNT c = 0; c < CHOICES && w[SIGMA] < 0.1 * w[LARGEST]; c++) {
+      if (c != w[CHOICE] && renew(n, w, c)) copy(w, n);
+    }
+    """
 ASSEMBLE = """
 /* lane s at the design position of its geometry: 1 if it closes there */
 ANSWER assemble(LANE s) {
@@ -170,6 +202,16 @@ ANSWER assemble(LANE s) {
   return s[CLOSURE] <= CLOSED && s[BRANCH] > 0.0 ? 1 : 0;
 }
 """
+
+
+def _by_choice(name: str, programs: Sequence[Program]) -> Iterator[str]:
+    """Yield the functions of a program, by the choice of rows of the lane if there are several."""
+    if len(programs) == 1:
+        yield program_text(name, programs[0])
+        return
+    yield from (program_text(f"{name}_of_{k}", each) for k, each in enumerate(programs))
+    calls = [f"if (s[CHOICE] == {k}.0) {name}_of_{k}(s);" for k in range(len(programs))]
+    yield _function(f"ACTION {name}(LANE s)", calls)
 
 
 def program_text(name: str, program: Program) -> str:
@@ -331,7 +373,7 @@ def steps_text(solved: SolvedCase) -> str:
     drives = [line for each in solved.drives() for line in _drive(*each)]
     kept = [line for each in solved.outputs for line in _kept(each)]
     told = [line for k, each in enumerate(solved.outputs) for line in _told(k, each)]
-    programs = [program_text(name, each) for name, each in solved.programs.items()]
+    programs = [text for each in solved.programs.items() for text in _by_choice(*each)]
     parts = [
         *programs,
         _function("ACTION sample(LANE s, NUMBER t)", ["VALUE x;", f"s[{time}] = t;", *drives]),
@@ -341,6 +383,11 @@ def steps_text(solved: SolvedCase) -> str:
         parts.append(_function("ACTION keep(LANE n, FROM w, NUMBER h)", ["VALUE x;", *kept]))
     else:
         steps = steps.replace("      keep(n, w, to - w[AT]);\n", "")
+    has_choices = bool(solved.others)
+    prepare = "prepare(n);" if solved.parameters else ""
+    renew = BETTER_ROWS.replace("PREPARE", prepare).lstrip()
+    steps = steps.replace("TRY_BETTER_ROWS", TRY_BETTER_ROWS if has_choices else "")
+    steps = steps.replace("BETTER_ROWS\n", renew if has_choices else "")
     if solved.parameters:
         values = (0.0, 0.0, 0.0, 1.0, 0.0)
         still = [
@@ -365,7 +412,9 @@ def steps_text(solved: SolvedCase) -> str:
 def tables(solved: SolvedCase) -> dict[str, Sequence[float]]:
     """Return the tables of the code by name: whole numbers but for the start."""
     carried = solved.model.plan.carried
+    standing = {"STANDING": solved.standing} if solved.others else {}
     return {
+        **standing,
         "CARRY_FROM": [source for source, _ in carried],
         "CARRY_TO": [target for _, target in carried],
         "START": solved.start,

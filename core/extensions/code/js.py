@@ -79,7 +79,6 @@ def source(solved: SolvedCase) -> str:
         [
             f"/* {solved.case.name}, written by kincheck: lengths in m, angles in rad */",
             *(f"const {key} = {value!r};" for key, value in solved.numbers.items()),
-            f"const CARRIED = {len(known['CARRY_TO'])};",
             *(
                 JAVASCRIPT.table.format(name=table, numbers=", ".join(map(repr, values)))
                 for table, values in known.items()
