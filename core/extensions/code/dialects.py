@@ -230,7 +230,7 @@ def program_text(name: str, program: Program) -> str:
     kept = [x for k in worked for x in map(int, nodes[k][1:]) if at.get(x, at[k]) != at[k]]
     kept += [k for k in outputs if at.get(k, last) != last]
     place = {k: number for number, k in enumerate(dict.fromkeys(kept))}
-    functions: list[str] = []
+    functions, before = list[str](), list[str]()
     for number, piece in enumerate(pieces or [[]]):
         needed = [x for k in piece for x in map(int, nodes[k][1:])]
         needed += outputs if number == max(last, 0) else ()
@@ -245,10 +245,13 @@ def program_text(name: str, program: Program) -> str:
             if k in place:
                 lines.append(f"t[{place[k]}] = v{k};")
         if number < last:
-            functions.append(_function(f"ACTION {name}_{number}(LANE s, LANE t)", lines))
+            used = [each for each in "st" if any(f"{each}[" in line for line in lines)]
+            given = ", ".join(f"LANE {each}" for each in used)
+            functions.append(_function(f"ACTION {name}_{number}({given})", lines))
+            before.append(f"{name}_{number}({', '.join(used)});")
             continue
-        before = [f"{name}_{k}(s, t);" for k in range(last)]
-        before = [f"SCRATCH(t, {max(1, len(place))});", *before] if before else []
+        if before:
+            before.insert(0, f"SCRATCH(t, {max(1, len(place))});")
         writes = [f"s[{slot}] = v{k};" for slot, k in program.outputs.items()]
         functions.append(_function(f"ACTION {name}(LANE s)", [*before, *lines, *writes]))
     return "\n\n".join(functions)
