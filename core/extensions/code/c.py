@@ -10,8 +10,8 @@ from ...case.case import Case
 from .dialects import C, steps_text, tables, words_of
 from .solved import SolvedCase, solved_case
 
-REALS = ("START", "NOMINAL")
-"""The tables that are not of whole numbers."""
+WHOLE = ("CARRY", "STANDING")
+"""Beginnings of the tables of whole numbers."""
 HEADER = """\
 /* {case}: {source}
  * Written by kincheck. Each output has three numbers, in the order of the outputs: its value,
@@ -153,7 +153,7 @@ def source(solved: SolvedCase, name: str) -> str:
         known["NOMINAL"] = [each.nominal for each in solved.parameters]
     lines = [
         C.table.format(
-            kind="double" if table in REALS else "int",
+            kind="int" if table.startswith(WHOLE) else "double",
             name=table,
             numbers=", ".join(map(repr, values)),
         )

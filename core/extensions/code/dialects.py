@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from ...case.quantity import STILL
 from ...kinematics.compiled.request import TIME
-from ...mechanism.motions import Absolute, Motion, Ramp, Sine
+from ...mechanism.motions import Absolute, Motion, Ramp, Sine, Table
 from ...program import Program
 from ...unit_text import with_unit
 from .solved import CodeOutput, SolvedCase
@@ -298,8 +298,8 @@ def _constant(value: float) -> str:
     return "NOTHING" if math.isnan(value) else "INFINITY" if value > 0.0 else "(-INFINITY)"
 
 
-def _drive(slots: Sequence[int], motion: Motion, factor: float) -> Iterator[str]:
-    """Yield the lines that set the five numbers of a driver at time t."""
+def _drive(k: int, slots: Sequence[int], motion: Motion, factor: float) -> Iterator[str]:
+    """Yield the lines that set the five numbers of the k-th driver at time t."""
     shift = 0.0
     if isinstance(motion, Absolute):
         motion, shift = motion.motion, motion.design
@@ -309,6 +309,16 @@ def _drive(slots: Sequence[int], motion: Motion, factor: float) -> Iterator[str]
         x = f"{motion.amplitude!r} * sin{angle} - {shift!r}"
         v = f"{motion.amplitude * w!r} * cos{angle}"
         a = f"{-motion.amplitude * w * w!r} * sin{angle}"
+    elif isinstance(motion, Table):
+        yield f"COUNT i{k} = 0;"
+        yield f"while (i{k} < {len(motion.times) - 2} && t > KNOTS_{k}[i{k} + 1]) i{k}++;"
+        yield f"REAL h{k} = t - KNOTS_{k}[i{k}];"
+        c3, c2, c1, c0 = (f"PIECES_{k}[4 * i{k} + {j}]" for j in range(4))
+        first, last = motion.span
+        known = f"t >= {first!r} && t <= {last!r}"
+        x = f"({known} ? (({c3} * h{k} + {c2}) * h{k} + {c1}) * h{k} + {c0} - {shift!r} : NOTHING)"
+        v = f"(3.0 * {c3} * h{k} + 2.0 * {c2}) * h{k} + {c1}"
+        a = f"6.0 * {c3} * h{k} + 2.0 * {c2}"
     else:
         assert isinstance(motion, Ramp)
         x, v, a = f"{motion.rate!r} * t - {shift!r}", repr(motion.rate), "0.0"
@@ -373,7 +383,7 @@ def _function(head: str, body: Iterable[str]) -> str:
 def steps_text(solved: SolvedCase) -> str:
     """Return the functions of a lane: programs, samples, steps and outputs."""
     time = solved.model.slots[TIME]
-    drives = [line for each in solved.drives() for line in _drive(*each)]
+    drives = [line for k, each in enumerate(solved.drives()) for line in _drive(k, *each)]
     kept = [line for each in solved.outputs for line in _kept(each)]
     told = [line for k, each in enumerate(solved.outputs) for line in _told(k, each)]
     programs = [text for each in solved.programs.items() for text in _by_choice(*each)]
@@ -415,9 +425,15 @@ def steps_text(solved: SolvedCase) -> str:
 def tables(solved: SolvedCase) -> dict[str, Sequence[float]]:
     """Return the tables of the code by name: whole numbers but for the start."""
     carried = solved.model.plan.carried
+    motions = dict[str, Sequence[float]]()
+    for k, (_, motion, _) in enumerate(solved.drives()):
+        plain = motion.motion if isinstance(motion, Absolute) else motion
+        if isinstance(plain, Table):
+            motions |= {f"KNOTS_{k}": plain.times, f"PIECES_{k}": plain.pieces}
     standing = {"STANDING": solved.standing} if solved.others else {}
     return {
         **standing,
+        **motions,
         "CARRY_FROM": [source for source, _ in carried],
         "CARRY_TO": [target for _, target in carried],
         "START": solved.start,

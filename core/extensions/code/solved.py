@@ -38,7 +38,7 @@ from ...kinematics.compiled.request import (
 from ...kinematics.continuation.segments import BETTER, NEAR, Followed
 from ...kinematics.continuation.walk import follow_samples
 from ...kinematics.formulation.acceptance_criteria import LOW
-from ...mechanism.motions import Absolute, Motion, Ramp, Sine
+from ...mechanism.motions import Absolute, Motion, Ramp, Sine, Table
 from ...program import DONE, MARGIN, Program, Tape, program, where_larger
 from ...trajectory import QUANTITIES
 from ..sweep.curves import moved_by
@@ -241,10 +241,10 @@ def solved_case(case: Case, places: Sequence[str], bodies: Sequence[str] = ()) -
     path = case.sweep.path
     for name, motion in path.motions.items():
         plain = motion.motion if isinstance(motion, Absolute) else motion
-        if not isinstance(plain, Ramp | Sine):
+        if not isinstance(plain, Ramp | Sine | Table):
             raise KincheckError(
                 f"{case.name}: the driver {name} follows a {type(plain).__name__.lower()}, which"
-                " code cannot have. Give it a ramp or a sine, or sweep it."
+                " code cannot have. Give it a table, a ramp or a sine, or sweep it."
             )
     measured = tuple(each for each in case.outputs if not each.forces)
     if not measured:

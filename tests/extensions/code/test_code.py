@@ -16,6 +16,7 @@ from kincheck.core import KincheckError
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.code import c, js
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+from scipy.interpolate import CubicSpline
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
 CLOSE = 1e-13
@@ -335,3 +336,45 @@ def test_code_leaves_forces_out(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr()
     assert said.out == "code/mcpherson_strut_loaded.mjs\n"
     assert "the code has no forces" in said.err
+
+
+def driven_by(motion, folder):
+    """A crank that follows a motion over time."""
+    text = f"""{CRANK}[drivers.turn]
+type = "joint_angle"
+joint = "pivot"
+[drivers.turn.motion]
+{motion}
+[sweep]
+driver = "time"
+start = 0.0
+stop = 2.0
+steps = 41
+[outputs.angle]
+type = "joint_angle"
+joint = "pivot"
+"""
+    (folder / "crank.toml").write_text(text)
+    return kincheck.load(folder / "crank.toml")
+
+
+@compiled
+def test_table_motion_equals_spline(tmp_path):
+    times, values = [-0.5, 0.0, 0.4, 1.1, 2.0], [0.3, 0.0, 0.9, -0.4, 0.2]
+    case = driven_by(f'type = "table"\ntimes = {times}\nvalues = {values}', tmp_path)
+    write(tmp_path, c.files(case, ()))
+    call = library(tmp_path, "crank")
+    found = solve(call, case)
+    spline = CubicSpline(times, values, bc_type="natural")
+    expected = np.stack([spline(case.sweep.values, k) for k in range(3)], axis=-1)
+    assert_equal(found[:, 0], expected)
+    state = (ctypes.c_double * (call("size") // 8))()
+    out = (ctypes.c_double * 3)()
+    call("start", state)
+    assert call("move", state, 2.1, 1.0, out) == 1  # the table ends before
+
+
+def test_formula_motion_is_refused(tmp_path):
+    case = driven_by('type = "formula"\nformula = "STEP(TIME, 0, 0, 1, 2)"', tmp_path)
+    with pytest.raises(KincheckError, match="the driver turn follows a formula"):
+        c.files(case, ())
