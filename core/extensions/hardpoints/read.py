@@ -34,12 +34,13 @@ from .design import (
     with_axis,
     with_suspension_outputs,
 )
+from .guess import question_of
 from .options import WheelOptions
 from .roles import fill_roles, listed, template_of
 from .rubber import of_chrono, with_file, with_rubber
 from .shims import shims
 from .suspension import Side
-from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, positions_of, unit_of, wanted_corner
+from .table import Axes, HardpointTable, axes_of, positions_of, unit_of, wanted_corner
 from .templates import (
     WHEEL_CENTER,
     WHEEL_CONTACT,
@@ -63,6 +64,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: WheelOptions) -> Case:
     points of the knuckle.
 
     Raises:
+        OpenError: the table leaves facts open, and here is a guess.
         CaseError: the table lacks facts, or does not fill the roles of the template.
     """
     file = table.file
@@ -73,15 +75,10 @@ def case_of_hardpoints(table: HardpointTable, supplied: WheelOptions) -> Case:
             f"found {len(table.points)} points, expected a suspension's, {MOST_POINTS} at most;"
             " take out the others",
         )
-    if not (table.unit or supplied.units or table.axes or supplied.axes):
-        raise fault(
-            file,
-            "",
-            "says neither its unit nor where x, y and z point, expected both from you; add --units"
-            f" mm or m, and --axes {AXES_IN_USE}",
-        )
-    unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
     table = _of_corner(table, supplied.corner)
+    if question := question_of(table, supplied, case_of_hardpoints):
+        raise question
+    unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
     template, of_names = template_of(table, supplied)
     named, told = fill_roles(table, template, supplied)
     told = [*of_names, *told]
@@ -95,6 +92,14 @@ def case_of_hardpoints(table: HardpointTable, supplied: WheelOptions) -> Case:
     if side is Side.RIGHT:  # a template describes the left side
         axes = [(k, -sign if k == 1 else sign) for k, sign in axes]
         at = {role: (x, -y, z) for role, (x, y, z) in at.items()}
+    if WHEEL_CONTACT not in named and table.wheel_radius and supplied.wheel_radius is None:
+        bare = table.wheel_radius[-1].isdigit()
+        radius = f"{table.wheel_radius}{unit.name if bare else ''}"
+        supplied = replace(supplied, wheel_radius=radius)
+        told.append(f"wheel radius {radius}, of the file")
+    if table.static_toe or table.static_camber:
+        angles = (f"{math.degrees(x):.6g} deg" for x in (table.static_toe, table.static_camber))
+        told.append("static toe {} and camber {}, of the file".format(*angles))
     vehicle = vehicle_of(table, template, named, at, supplied, side)
     travels = read_travels(file, supplied.travel, supplied.rack)
 

@@ -6,13 +6,15 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 from ...case.io.document import fault, parse, read_text, require_known, shown, unknown_name
 from ...case.io.escape import visible
 from ...errors import MOST_NAMED, brief, shortened, similar
 from .options import WheelOptions
 from .table import HardpointTable
-from .templates import NAMES, TEMPLATE_NAMES, TEMPLATES, Role, Template, compact, side_of
+from .templates import NAMES, ROLES, TEMPLATE_NAMES, TEMPLATES, Role, Template, compact, side_of
+from .words import by_words
 
 LARGEST_NAMES = 100_000
 # Names as alike as this are taken for misspelt or abridged ones.
@@ -25,28 +27,44 @@ _SPELLINGS: Mapping[str, str] = {
 def template_of(table: HardpointTable, supplied: WheelOptions) -> tuple[Template, list[str]]:
     """Return the template that the user or the file states, or else the one whose roles the points
     fill by their names, with a note.
+
+    Raises:
+        CaseError: there is no such template, two are stated, or nothing tells which it is.
+    """
+    if (stated := stated_template(table, supplied)) is not None:
+        return stated, []
+    fitting = fitting_templates(table, supplied)
+    if len(fitting) != 1:
+        problem = "does not say what suspension it is of, expected it from you; add --template"
+        names = " or ".join(each.name for each in fitting) or f"one of {', '.join(TEMPLATES)}"
+        raise fault(table.file, "", f"{problem} {names}")
+    (found,) = fitting
+    return found, [f"template {found.name}, by the names of its points: --template states it"]
+
+
+def fitting_templates(table: HardpointTable, supplied: WheelOptions) -> list[Template]:
+    """Return the templates whose roles the points fill by their names; of several, the largest."""
+    guessed = [each for each in TEMPLATES.values() if each.guessed and not supplied.ask_names]
+    fitting = [each for each in guessed if _fills(table, each)]
+    roles = max((len(each.roles) for each in fitting), default=0)
+    return [each for each in fitting if len(each.roles) == roles]
+
+
+def stated_template(table: HardpointTable, supplied: WheelOptions) -> Template | None:
+    """Return the template that the user or the file states; None without.
+
+    Raises:
+        CaseError: there is no such template, or two are stated.
     """
     known, said = TEMPLATE_NAMES, supplied.template
     if said is not None and compact(said) not in known:
         raise unknown_name(table.file, "--template", said, TEMPLATES, "a template")
-    names = ", ".join(TEMPLATES)
     if table.template is None:
-        if said is not None:
-            return known[compact(said)], []
-        guessed = [each for each in TEMPLATES.values() if each.guessed and not supplied.ask_names]
-        fitting = [each for each in guessed if _fills(table, each)]
-        roles = max((len(each.roles) for each in fitting), default=0)
-        largest = [each for each in fitting if len(each.roles) == roles]
-        if len(largest) != 1:
-            problem = "does not say what suspension it is of, expected it from you; add --template"
-            names = " or ".join(each.name for each in largest) or f"one of {names}"
-            raise fault(table.file, "", f"{problem} {names}")
-        (found,) = largest
-        return found, [f"template {found.name}, by the names of its points: --template states it"]
+        return None if said is None else known[compact(said)]
     if compact(table.template) not in known:
         problem = (
             f"found {shown(table.template)}, expected one of those that there is a template for;"
-            f" known: {names}"
+            f" known: {', '.join(TEMPLATES)}"
         )
         raise fault(table.file, "Template", problem)
     written = known[compact(table.template)]
@@ -56,7 +74,15 @@ def template_of(table: HardpointTable, supplied: WheelOptions) -> tuple[Template
             " out --template"
         )
         raise fault(table.file, "--template", problem)
-    return written, []
+    return written
+
+
+def known_roles(
+    table: HardpointTable, template: Template, supplied: WheelOptions
+) -> dict[str, str]:
+    """Return the points of the roles that names tell, those that are misspelt among them."""
+    filled, _, near = _by_names(table, template, supplied, table.roles)
+    return filled | {role: name for role, name in near.items() if name}
 
 
 def fill_roles(
@@ -64,47 +90,33 @@ def fill_roles(
 ) -> tuple[dict[str, str], list[str]]:
     """Return the name of the point for each role of the template, and notes on the names. A file of
     names that does not exist yet is written.
+
+    Raises:
+        CaseError: a role has no point, or several, or the file of names is not right.
     """
-    own = supplied.names
+    own, given = supplied.names, dict(table.roles)
     new = own is not None and not own.exists()
-    named = _points_by_role(table)
-    filled = dict[str, str]()
     if own is not None and not new:
         roles = [role.name for role in (*template.roles, *template.optional)]
-        filled |= _read_own_names(own, roles, table.points)
-    unnamed = own if not filled and not new else None
-    for role in (*template.roles, *template.optional):
-        if role.name in filled:
-            continue
-        found = named(role)
-        if len(found) > 1:
-            places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
-            raise fault(
-                table.file,
-                role.name,
-                f"found {places}, expected one point; remove what {role.meaning} is not",
-            )
-        if found:
-            filled[role.name] = found[0]
-    missing = [role for role in template.roles if role.name not in filled]
-    unused = {compact(name): name for name in table.points if name not in filled.values()}
-    near = dict[str, str]()
-    for role in missing:
-        close = (found for each in role.names if (found := similar(each, unused, LIKE)))
-        near[role.name] = unused.get(next(close, ""), "")
+        given |= _read_own_names(own, roles, table.points)
+    unnamed = own if own is not None and not new and not given else None
+    filled, by_words, near = _by_names(table, template, supplied, given)
     told = list[str]()
-    distinct = len({*near.values()}) == len(near)
-    sure = distinct and all(_fits(role, name) for role, name in near.items())
-    if missing and sure and not supplied.ask_names:
-        filled |= near
-        taken = ", ".join(f"{role} is {visible(name)!r}" for role, name in near.items())
+    missing = [role for role in template.roles if role.name not in filled]
+    guessed = {role: filled[role] for role in by_words}
+    if missing and _sure(near) and not supplied.ask_names:
+        filled, guessed, missing = filled | near, guessed | near, []
+    if guessed:
+        taken = ", ".join(f"{role} is {visible(name)!r}" for role, name in guessed.items())
         told.append(f"names guessed: {taken}; --names FILE states them, --ask-names refuses")
-        missing = []
+    if unnamed is not None and not missing:
+        told.append(f"{unnamed}: all lines are comments, so it names no point")
     if own is not None and new:
         _write_names(own, template, filled)
         told.append(f"{own}: written, with the names of the points by role")
     if not missing:
         return filled, told
+    unused = [name for name in table.points if name not in filled.values()]
     lines = list[str]()
     for role in missing:
         name = near[role.name]
@@ -122,12 +134,61 @@ def fill_roles(
     raise fault(
         table.file,
         "",
-        f"{problem}; found beside: {listed([*unused.values()])}; rename or add them, or {advice}",
+        f"{problem}; found beside: {listed(unused)}; rename or add them, or {advice}",
     )
 
 
-def _points_by_role(table: HardpointTable) -> Callable[[Role], list[str]]:
-    """Return what gives the points with a name of a role, or else with one and their side."""
+def _by_names(
+    table: HardpointTable, template: Template, supplied: WheelOptions, given: Mapping[str, str]
+) -> tuple[dict[str, str], list[str], dict[str, str]]:
+    """Return the points of roles by their names, the roles among them that only words tell, and for
+    each needed role without a point the name most like it, if there is one.
+
+    Args:
+        given: points of roles that are known otherwise.
+
+    Raises:
+        CaseError: two points have names of one role.
+    """
+    exact, worded = _points_by_role(table)
+    filled, by_words = dict(given), list[str]()
+    for role in (*template.roles, *template.optional):
+        if role.name in filled:
+            continue
+        found = exact(role)
+        if len(found) > 1:
+            places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
+            raise fault(
+                table.file,
+                role.name,
+                f"found {places}, expected one point; remove what {role.meaning} is not",
+            )
+        if not found and not supplied.ask_names and len(found := worded(role)) == 1:
+            by_words.append(role.name)
+        if len(found) == 1:
+            filled[role.name] = found[0]
+    unused = {compact(name): name for name in table.points if name not in filled.values()}
+    near = dict[str, str]()
+    for role in template.roles:
+        if role.name not in filled:
+            close = (found for each in role.names if (found := similar(each, unused, LIKE)))
+            near[role.name] = unused.get(next(close, ""), "")
+    return filled, by_words, near
+
+
+def _sure(near: Mapping[str, str]) -> bool:
+    """Return whether names like those of roles are of one role each, and say nothing else."""
+    distinct = len({*near.values()}) == len(near)
+    return distinct and all(_fits(role, name) for role, name in near.items())
+
+
+_Names: TypeAlias = Callable[[Role], list[str]]
+
+
+def _points_by_role(table: HardpointTable) -> tuple[_Names, _Names]:
+    """Return what gives the points with a name of a role, or else with one and their side; and what
+    gives those whose names say it in other words.
+    """
     by_compact_name = dict[str, list[str]]()
     by_side_name = dict[str, list[str]]()
     sides = [side for _, side in map(side_of, table.points)]
@@ -143,13 +204,17 @@ def _points_by_role(table: HardpointTable) -> Callable[[Role], list[str]]:
         found = [name for each in names for name in by_compact_name.get(each, ())]
         return found or [name for each in names for name in by_side_name.get(each, ())]
 
-    return points
+    others = [
+        name for name in table.points if not {compact(name), compact(side_of(name)[0])} & ROLES
+    ]
+    by_word = by_words(others, wheel)
+    return points, lambda role: by_word(role.name)
 
 
 def _fills(table: HardpointTable, template: Template) -> bool:
     """Return whether each role of a template has one point of its own by name."""
-    named = _points_by_role(table)
-    found = [named(role) for role in template.roles]
+    exact, worded = _points_by_role(table)
+    found = [exact(role) or worded(role) for role in template.roles]
     return all(len(each) == 1 for each in found) and len({each[0] for each in found}) == len(found)
 
 
@@ -168,16 +233,20 @@ def _words(name: str) -> set[str]:
     return {word for part in parts if (word := _SPELLINGS.get(part.lower()))}
 
 
-def _write_names(file: Path, template: Template, filled: Mapping[str, str]) -> None:
-    """Write a file of names, with a comment for each role without a point."""
+def names_text(template: Template, filled: Mapping[str, str]) -> str:
+    """Return the text of a file of names, with a comment for each role without a point."""
     lines = [
         f"{role.name} = {json.dumps(filled[role.name], ensure_ascii=False)}"
         if role.name in filled
         else f'# {role.name} = ""  # {role.meaning}'
         for role in (*template.roles, *template.optional)
     ]
+    return "\n".join(lines) + "\n"
+
+
+def _write_names(file: Path, template: Template, filled: Mapping[str, str]) -> None:
     try:
-        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        file.write_text(names_text(template, filled), encoding="utf-8")
     except OSError as error:
         raise fault(file, "--names", f"cannot be written ({error}); choose another file") from None
 
