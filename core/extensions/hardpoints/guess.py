@@ -29,6 +29,8 @@ RADII = 0.18, 0.55
 # An assignment is refused that is less like a sample than any car, and doubtful if another one is
 # nearly as good.
 WORST, NEARLY = 6.0, 1.5
+# As many roles by name tell the template.
+ENOUGH = 4
 # More points than a corner has are not searched.
 MOST = 60
 
@@ -70,6 +72,9 @@ def question_of(
         every = [each for each in TEMPLATES.values() if each.guessed]
         templates = [TEMPLATES[hint]] if hint else templates or every
     known = {each.name: known_roles(table, each, supplied) for each in templates}
+    most = max(map(len, known.values()))
+    if most >= ENOUGH:  # names tell the template, though not all of its points
+        templates = [each for each in templates if len(known[each.name]) == most]
     for found, doubts in _likely(table, supplied, templates, known):
         guess = _Guess(table, supplied, wanted, found, doubts)
         with suppress(CaseError):
@@ -87,6 +92,10 @@ def _likely(
     """Return the likely assignments, the best first, each with what is doubtful about it."""
     side = supplied.side or table.side
     points = _of_one_side(table, side)
+    known = {
+        template: {role: name for role, name in roles.items() if name in points}
+        for template, roles in known.items()
+    }
     found = list[Fit]()
     stated = next(filter(None, map(axes_said, table.texts)), "")
     if supplied.axes or table.axes:

@@ -78,10 +78,10 @@ def case_of_hardpoints(table: HardpointTable, supplied: WheelOptions) -> Case:
     table = _of_corner(table, supplied.corner)
     if question := question_of(table, supplied, case_of_hardpoints):
         raise question
-    unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
     template, of_names = template_of(table, supplied)
     named, told = fill_roles(table, template, supplied)
     told = [*of_names, *told]
+    unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
     points = positions_of(table, unit, axes)
     at = {role: points[name] for role, name in named.items()}
     size = max(math.dist(a, b) for a in at.values() for b in at.values())

@@ -19,6 +19,8 @@ from .words import by_words
 LARGEST_NAMES = 100_000
 # Names as alike as this are taken for misspelt or abridged ones.
 LIKE = 0.75
+# Names that lack no more roles than this tell the template, for the message on those.
+FEW = 2
 _SPELLINGS: Mapping[str, str] = {
     other: word for word, others in NAMES["spellings"].items() for other in others
 }
@@ -34,6 +36,10 @@ def template_of(table: HardpointTable, supplied: WheelOptions) -> tuple[Template
     if (stated := stated_template(table, supplied)) is not None:
         return stated, []
     fitting = fitting_templates(table, supplied)
+    if not fitting and not supplied.ask_names:  # names may tell it, though not all of its points
+        lacking = {each.name: _lacking(table, each) for each in TEMPLATES.values() if each.guessed}
+        fewest = min(lacking.values())
+        fitting = [TEMPLATES[name] for name, count in lacking.items() if count == fewest <= FEW]
     if len(fitting) != 1:
         problem = "does not say what suspension it is of, expected it from you; add --template"
         names = " or ".join(each.name for each in fitting) or f"one of {', '.join(TEMPLATES)}"
@@ -216,6 +222,12 @@ def _fills(table: HardpointTable, template: Template) -> bool:
     exact, worded = _points_by_role(table)
     found = [exact(role) or worded(role) for role in template.roles]
     return all(len(each) == 1 for each in found) and len({each[0] for each in found}) == len(found)
+
+
+def _lacking(table: HardpointTable, template: Template) -> int:
+    """Return how many roles of a template no name tells."""
+    exact, worded = _points_by_role(table)
+    return sum(not (exact(role) or worded(role)) for role in template.roles)
 
 
 def _fits(role: str, name: str) -> bool:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
@@ -216,6 +216,15 @@ def _join_words(words: Sequence[Cell]) -> Sequence[Cell]:
     return words
 
 
+def _with_names(rows: Sequence[Row]) -> Iterator[Row]:
+    """Yield rows between blanks; a head x, y, z may stand above rows that begin with names."""
+    for k, (where, cells) in enumerate(rows):
+        after = rows[k + 1][1] if k + 1 < len(rows) else ()
+        three = [_column(str(cell))[0] for cell in cells] == ["x", "y", "z"]
+        named = three and len(after) == 4 and not is_number(after[0])
+        yield where, ["name", *cells] if named else cells
+
+
 def read_rows(
     table: Table, tool: str, facts: dict[str, str], supplied: WheelOptions
 ) -> HardpointTable:
@@ -233,6 +242,7 @@ def read_rows(
     file, delimiter, rows = table.file, table.delimiter.strip(" "), [*table.rows()]
     if table.delimiter == " ":
         rows = [(where, _join_words([*filter(None, cells)])) for where, cells in rows]
+        rows = [*_with_names(rows)]
     if (parts := _parts(file, rows)) is None:
         where, cells = rows[0]
         raise fault(

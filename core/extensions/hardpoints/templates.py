@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from unicodedata import combining, normalize
 
+from ...case.io.table import folded
 from ...errors import CaseError, unknown
 from ...joints import Distance, Joint
 from ...mechanism.mechanism import Point, Vector
@@ -130,12 +130,6 @@ def normal(name: str) -> str:
     """
     plain = folded(name).replace("centre", "center").replace("tie_rod", "tierod")
     return re.sub(r"^hp[ls]_", "", plain)
-
-
-def folded(text: str, case: Callable[[str], str] = str.casefold) -> str:
-    """Return a text in small letters without accents, with _ between its words."""
-    apart = normalize("NFKD", case(text))
-    return re.sub(r"[\W_]+", "_", "".join(each for each in apart if not combining(each))).strip("_")
 
 
 def compact(name: str) -> str:

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from ...case.io.document import decimal
-from ...case.io.table import numeral, read_unit
+from ...case.io.table import folded, numeral, read_unit
 from ...case.units import LENGTHS
 from .table import STATIC_ANGLES, is_axes, length_name
-from .templates import TEMPLATE_NAMES, compact, corner_of, folded, normal
+from .templates import TEMPLATE_NAMES, compact, corner_of, normal
 
 _WRITTEN: Mapping[str, Any] = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
