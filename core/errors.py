@@ -98,8 +98,9 @@ class OpenError(CaseError):
         self, file: Path, why: Sequence[str], stated: Mapping[str, str], writes: Mapping[Path, str]
     ) -> None:
         self.file, self.why, self.stated, self.writes = file, why, stated, writes
-        lines = [f"{file} leaves open what options state. The best guess:", *why]
-        super().__init__("\n".join([*lines, f"Add: {shlex.join(self.options)}"]))
+        told = " ".join(map(str.strip, why))
+        add = shlex.join(self.options)
+        super().__init__(f"{file} leaves open what options state. Guess: {told} Add: {add}")
 
     @property
     def options(self) -> list[str]:

@@ -64,23 +64,20 @@ def every_axes(right_handed: bool = True) -> list[str]:
 
 
 def fits(
-    points: Mapping[str, Sequence[float]],
-    templates: Sequence[Template],
-    axes: Iterable[str],
-    known: Mapping[str, Mapping[str, str]],
+    tries: Iterable[tuple[Template, Mapping[str, Sequence[float]], Mapping[str, str]]],
+    axes: Sequence[str],
 ) -> list[Fit]:
-    """Return the best assignments for each template, the best first.
+    """Return the best assignments, the best first.
 
     Args:
-        points: coordinates by name.
+        tries: templates, each with coordinates by name, and points whose roles are known, by role.
         axes: possible ones.
-        known: for each template, points whose roles are known, by role.
     """
-    names = [*points]
-    raw = np.array([*points.values()], dtype=float)
     starts = list[tuple[float, _Start, Array]]()
-    for template in templates:
-        fixed = {role: names.index(name) for role, name in known[template.name].items()}
+    for template, points, known in tries:
+        names = [*points]
+        raw = np.array([*points.values()], dtype=float)
+        fixed = {role: names.index(name) for role, name in known.items()}
         if len(template.roles) > len(names):
             continue
         for each in axes:
@@ -88,13 +85,13 @@ def fits(
             for sample in _samples(template.name):
                 for place in _scaled(at, fixed, sample):
                     chosen = _by_places(place, sample, fixed)
-                    start = _Start(template, each, at, place, sample, fixed)
+                    start = _Start(template, each, names, at, place, sample, fixed)
                     starts.append((start.cost(chosen), start, chosen))
     found = list[Fit]()
     for _, start, chosen in sorted(starts, key=lambda each: each[0])[:BEST]:
         chosen, cost = start.improved(chosen)
         pairs = zip(start.sample.roles, chosen, strict=True)
-        roles = {role: names[k] for role, k in pairs if k >= 0}
+        roles = {role: start.names[k] for role, k in pairs if k >= 0}
         found.append(Fit(start.template, start.axes, roles, cost))
     return sorted(found, key=lambda each: each.cost)
 
@@ -205,6 +202,7 @@ class _Start:
 
     template: Template
     axes: str
+    names: Sequence[str]
     at: Array
     place: Array
     sample: _Sample

@@ -18,7 +18,7 @@ from .fitting import WORDS, Fit, every_axes, fits
 from .options import WheelOptions
 from .roles import fitting_templates, known_roles, names_text, stated_template
 from .table import HardpointTable, axes_of
-from .templates import TEMPLATES, WHEEL_CENTER, WHEEL_CONTACT, Template, side_of
+from .templates import ROLES, TEMPLATES, WHEEL_CENTER, WHEEL_CONTACT, Template, compact, side_of
 from .words import axes_said, template_said, unit_said
 
 # Half of the track of cars, race cars and lorries [m], and of a usual car.
@@ -35,13 +35,13 @@ ENOUGH = 4
 MOST = 60
 
 
-def question_of(
+def guess_of(
     table: HardpointTable,
     supplied: WheelOptions,
     case_of: Callable[[HardpointTable, WheelOptions], object],
-) -> OpenError | None:
-    """Return the question about what is open, with a guess that can be solved; None if nothing is
-    open, or no guess is like a suspension.
+) -> Guess | None:
+    """Return a guess of what is open that can be solved; None if nothing is open, or no guess is
+    like a suspension.
 
     Args:
         case_of: makes the case of a table.
@@ -76,10 +76,16 @@ def question_of(
     if most >= ENOUGH:  # names tell the template, though not all of its points
         templates = [each for each in templates if len(known[each.name]) == most]
     for found, doubts in _likely(table, supplied, templates, known):
-        guess = _Guess(table, supplied, wanted, found, doubts)
+        if not decided:
+            needed = {each.name for each in found.template.roles}
+            wanted["names"] = not needed <= known[found.template.name].keys()
+            like = [each.name for each in templates if each is not found.template]
+            told = len(known[found.template.name]) == most >= ENOUGH
+            doubts = [*doubts, *(f"it may be a {name}" for name in like if told)]
+        guess = Guess(table, supplied, wanted, found, [*dict.fromkeys(doubts)])
         with suppress(CaseError):
             case_of(replace(table, roles=found.roles), guess.taken)
-            return guess.question()
+            return guess
     return None
 
 
@@ -102,8 +108,8 @@ def _likely(
         places = axes_of(table, supplied.axes)
         stated = ",".join(WORDS[k][sign < 0.0] for k, sign in places)
     for axes in ([stated],) if stated else (every_axes(), every_axes(right_handed=False)):
-        each = fits(points, templates, axes, known)
-        found = [fit for fit in each if fit.cost < WORST and side in (None, _side(points, fit))]
+        every = fits([(one, _free(points, one), known[one.name]) for one in templates], axes)
+        found = [fit for fit in every if fit.cost < WORST and side in (None, _side(points, fit))]
         if found:
             break
     likely = list[tuple[Fit, list[str]]]()
@@ -131,6 +137,18 @@ def _of_one_side(table: HardpointTable, side: str | None) -> dict[str, Sequence[
     return {name: p.position for name, p in table.points.items() if sides[name] in ("", own)}
 
 
+def _free(
+    points: Mapping[str, Sequence[float]], template: Template
+) -> Mapping[str, Sequence[float]]:
+    """Return the points whose names are not those of roles of other templates alone."""
+    own = {each for role in (*template.roles, *template.optional) for each in role.names}
+    return {
+        name: at
+        for name, at in points.items()
+        if (word := compact(side_of(name)[0])) not in ROLES or word in own
+    }
+
+
 def _column(fit: Fit, words: tuple[str, str]) -> tuple[int, float]:
     """Return the column of a direction among its two words, and its sign."""
     each = fit.axes.split(",")
@@ -143,13 +161,15 @@ def _side(points: Mapping[str, Sequence[float]], fit: Fit) -> str:
     return "left" if sign * points[fit.roles[WHEEL_CENTER]][k] > 0.0 else "right"
 
 
-class _Guess:
+class Guess:
     """A guess of what is open.
 
     Attributes:
         stated: the guess by the options' fields.
         why: a line for each.
         taken: the user's options with the guess, but for the names.
+        fit: template, axes and roles.
+        doubts: what may be otherwise.
     """
 
     def __init__(

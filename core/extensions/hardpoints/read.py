@@ -34,7 +34,7 @@ from .design import (
     with_axis,
     with_suspension_outputs,
 )
-from .guess import question_of
+from .guess import guess_of
 from .options import WheelOptions
 from .roles import fill_roles, listed, template_of
 from .rubber import of_chrono, with_file, with_rubber
@@ -76,8 +76,8 @@ def case_of_hardpoints(table: HardpointTable, supplied: WheelOptions) -> Case:
             " take out the others",
         )
     table = _of_corner(table, supplied.corner)
-    if question := question_of(table, supplied, case_of_hardpoints):
-        raise question
+    if guess := guess_of(table, supplied, case_of_hardpoints):
+        raise guess.question()
     template, of_names = template_of(table, supplied)
     named, told = fill_roles(table, template, supplied)
     told = [*of_names, *told]

@@ -180,6 +180,7 @@ def plain(folder, points, **more):
 def test_guess_is_the_plain_suspension(tmp_path, name):
     text, points = FORMS[name]
     case, error = asked(write(tmp_path, text, name))
+    assert ("names" in error.stated) is (name in ("points.csv", "bare.csv"))
     assert places(case) == places(plain(tmp_path, points)), str(error)
 
 
