@@ -12,13 +12,18 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy.optimize  # pyright: ignore[reportMissingTypeStubs]
+from numpy.typing import NDArray
 
 from ...trajectory import Array
 from .templates import TEMPLATES, WHEEL_CENTER, WHEEL_CONTACT, Template
 
+_optimize: Any = scipy.optimize
+Indices: TypeAlias = NDArray[np.intp]
+"""Of the point of each role; -1 without one."""
 WORDS = ("forward", "rearward"), ("left", "right"), ("up", "down")
 # A place as far from the sample's as this, and a direction as far from the sample's, cost 1. Cars
 # differ by such lengths [m]; their links by some twenty degrees.
@@ -73,7 +78,7 @@ def fits(
         tries: templates, each with coordinates by name, and points whose roles are known, by role.
         axes: possible ones.
     """
-    starts = list[tuple[float, _Start, Array]]()
+    starts = list[tuple[float, _Start, Indices]]()
     for template, points, known in tries:
         names = [*points]
         raw = np.array([*points.values()], dtype=float)
@@ -90,7 +95,8 @@ def fits(
     found = list[Fit]()
     for _, start, chosen in sorted(starts, key=lambda each: each[0])[:BEST]:
         chosen, cost = start.improved(chosen)
-        pairs = zip(start.sample.roles, chosen, strict=True)
+        numbers: list[int] = chosen.tolist()
+        pairs = zip(start.sample.roles, numbers, strict=True)
         roles = {role: start.names[k] for role, k in pairs if k >= 0}
         found.append(Fit(start.template, start.axes, roles, cost))
     return sorted(found, key=lambda each: each.cost)
@@ -104,7 +110,7 @@ class _Sample:
     roles: Sequence[str]
     needed: int
     at: Array
-    links: Array
+    links: Indices
     kingpin: Sequence[int]
 
 
@@ -161,7 +167,7 @@ def _scaled(at: Array, fixed: Mapping[str, int], sample: _Sample) -> Iterable[Ar
             yield moved * (1.0, 1.0, 1.0 / height) + center
 
 
-def _by_places(place: Array, sample: _Sample, fixed: Mapping[str, int]) -> Array:
+def _by_places(place: Array, sample: _Sample, fixed: Mapping[str, int]) -> Indices:
     """Return the point of each role by places, -1 without one."""
     gaps = place[None, :, :] - sample.at[:, None, :]
     cost = np.minimum((gaps * gaps).sum(axis=2) / FAR**2, 100.0)
@@ -173,19 +179,19 @@ def _by_places(place: Array, sample: _Sample, fixed: Mapping[str, int]) -> Array
             cost[row, point] = 0.0
     spare = np.full((len(cost), len(cost)), 1e6)
     spare[range(sample.needed, len(cost)), range(sample.needed, len(cost))] = 1.0
-    rows, columns = linear_sum_assignment(np.hstack([cost, spare]))
+    rows, columns = _optimize.linear_sum_assignment(np.hstack([cost, spare]))
     chosen = np.full(len(cost), -1)
     chosen[rows] = np.where(columns < len(place), columns, -1)
     return chosen
 
 
-def _place_cost(place: Array, chosen: Array, sample: _Sample) -> float:
+def _place_cost(place: Array, chosen: Indices, sample: _Sample) -> float:
     used = chosen >= 0
     gaps = place[chosen[used]] - sample.at[used]
     return float(np.minimum((gaps * gaps).sum(axis=1) / FAR**2, 10.0).mean())
 
 
-def _by_directions(at: Array, chosen: Array, sample: _Sample) -> float:
+def _by_directions(at: Array, chosen: Indices, sample: _Sample) -> float:
     """Return the mean cost of the directions of links between points."""
     a, b = sample.links.T
     there = (chosen[a] >= 0) & (chosen[b] >= 0)
@@ -208,7 +214,7 @@ class _Start:
     sample: _Sample
     fixed: Mapping[str, int]
 
-    def cost(self, chosen: Array) -> float:
+    def cost(self, chosen: Indices) -> float:
         """Return the cost of an assignment: of places, directions, and points without a role."""
         unused = len(self.at) - len({*chosen} - {-1})
         ahead = 0.0
@@ -222,7 +228,7 @@ class _Start:
             + ahead / AHEAD
         )
 
-    def improved(self, chosen: Array) -> tuple[Array, float]:
+    def improved(self, chosen: Indices) -> tuple[Indices, float]:
         """Return the assignment after all exchanges that lower its cost, and the cost."""
         roles, needed = self.sample.roles, self.sample.needed
         best, free = (

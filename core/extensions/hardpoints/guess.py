@@ -9,17 +9,19 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...case.io.escape import visible
 from ...case.units import LENGTHS
 from ...errors import CaseError, OpenError
-from .fitting import WORDS, Fit, every_axes, fits
 from .options import WheelOptions
 from .roles import fitting_templates, known_roles, names_text, stated_template
 from .table import HardpointTable, axes_of
 from .templates import ROLES, TEMPLATES, WHEEL_CENTER, WHEEL_CONTACT, Template, compact, side_of
-from .words import axes_said, template_said, unit_said
+from .words import axes_said, first_said, side_in, template_said, unit_said
+
+if TYPE_CHECKING:
+    from .fitting import Fit
 
 # Half of the track of cars, race cars and lorries [m], and of a usual car.
 HALF_TRACKS, USUAL = (0.4, 1.25), 0.72
@@ -68,7 +70,7 @@ def guess_of(
     if not any(wanted.values()):
         return None
     if not decided:
-        hint = next(filter(None, map(template_said, [table.file.stem, *table.texts])), "")
+        hint = first_said(template_said, [table.file.stem, *table.texts])
         every = [each for each in TEMPLATES.values() if each.guessed]
         templates = [TEMPLATES[hint]] if hint else templates or every
     known = {each.name: known_roles(table, each, supplied) for each in templates}
@@ -79,7 +81,8 @@ def guess_of(
         if not decided:
             needed = {each.name for each in found.template.roles}
             wanted["names"] = not needed <= known[found.template.name].keys()
-            like = [each.name for each in templates if each is not found.template]
+            fitting = [each for each in templates if len(each.roles) <= len(found.roles)]
+            like = [each.name for each in fitting if each is not found.template]
             told = len(known[found.template.name]) == most >= ENOUGH
             doubts = [*doubts, *(f"it may be a {name}" for name in like if told)]
         guess = Guess(table, supplied, wanted, found, [*dict.fromkeys(doubts)])
@@ -96,14 +99,16 @@ def _likely(
     known: Mapping[str, Mapping[str, str]],
 ) -> list[tuple[Fit, list[str]]]:
     """Return the likely assignments, the best first, each with what is doubtful about it."""
+    from .fitting import WORDS, every_axes, fits  # slow
+
     side = supplied.side or table.side
     points = _of_one_side(table, side)
     known = {
         template: {role: name for role, name in roles.items() if name in points}
         for template, roles in known.items()
     }
-    found = list[Fit]()
-    stated = next(filter(None, map(axes_said, table.texts)), "")
+    found: list[Fit] = []
+    stated = first_said(axes_said, table.texts)
     if supplied.axes or table.axes:
         places = axes_of(table, supplied.axes)
         stated = ",".join(WORDS[k][sign < 0.0] for k, sign in places)
@@ -112,7 +117,7 @@ def _likely(
         found = [fit for fit in every if fit.cost < WORST and side in (None, _side(points, fit))]
         if found:
             break
-    likely = list[tuple[Fit, list[str]]]()
+    likely: list[tuple[Fit, list[str]]] = []
     for fit in found[:3]:
         others = [
             each for each in found if each is not fit and each.cost < NEARLY * fit.cost + 0.02
@@ -132,7 +137,7 @@ def _likely(
 
 def _of_one_side(table: HardpointTable, side: str | None) -> dict[str, Sequence[float]]:
     """Return the coordinates of the points whose names say no other side."""
-    sides = {name: side_of(name)[1] for name in table.points}
+    sides = {name: side_in(name) for name in table.points}
     own = side or ("left" if "left" in sides.values() else "right")
     return {name: p.position for name, p in table.points.items() if sides[name] in ("", own)}
 
@@ -230,7 +235,7 @@ class Guess:
 
     def _why_axes(self) -> str:
         """Return what tells the axes."""
-        said = next(filter(None, map(axes_said, self.table.texts)), "")
+        said = first_said(axes_said, self.table.texts)
         if said == self.fit.axes:
             return "a text of the file says so"
         roles = self.fit.roles

@@ -14,7 +14,7 @@ from ...errors import MOST_NAMED, brief, shortened, similar
 from .options import WheelOptions
 from .table import HardpointTable
 from .templates import NAMES, ROLES, TEMPLATE_NAMES, TEMPLATES, Role, Template, compact, side_of
-from .words import by_words
+from .words import by_words, side_in
 
 LARGEST_NAMES = 100_000
 # Names as alike as this are taken for misspelt or abridged ones.
@@ -197,7 +197,7 @@ def _points_by_role(table: HardpointTable) -> tuple[_Names, _Names]:
     """
     by_compact_name = dict[str, list[str]]()
     by_side_name = dict[str, list[str]]()
-    sides = [side for _, side in map(side_of, table.points)]
+    sides = [*map(side_in, table.points)]
     wheel = table.side or ("right" if "left" not in sides else "left")
     for name in table.points:
         by_compact_name.setdefault(compact(name), []).append(name)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import zip_longest
 from pathlib import Path
@@ -16,7 +16,7 @@ from ...case.io.document import decimal
 from ...case.io.table import folded, numeral, read_unit
 from ...case.units import LENGTHS
 from .table import STATIC_ANGLES, is_axes, length_name
-from .templates import TEMPLATE_NAMES, compact, corner_of, normal
+from .templates import TEMPLATE_NAMES, compact, corner_of, normal, side_of
 
 _WRITTEN: Mapping[str, Any] = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
@@ -58,6 +58,12 @@ def _by_length(kind: str) -> Sequence[tuple[str, Sequence[str]]]:
         for word in words:
             found.setdefault(word, []).append(meaning)
     return sorted(found.items(), key=lambda each: -len(each[0]))
+
+
+def side_in(name: str) -> str:
+    """Return the side in a point's name, at either end or in words; empty without one."""
+    found = {*said(name, "name")} & {"left", "right"}
+    return side_of(name)[1] or (found.pop() if len(found) == 1 else "")
 
 
 def by_words(names: Collection[str], side: str) -> Callable[[str], list[str]]:
@@ -156,3 +162,8 @@ def template_said(text: str) -> str:
     """Return the template that a free text names; empty without one, or with several."""
     found = {*said(text, "template")}
     return found.pop() if len(found) == 1 else ""
+
+
+def first_said(read: Callable[[str], str], texts: Iterable[str]) -> str:
+    """Return what the first text says that says something to a function; empty without one."""
+    return next((found for each in texts if (found := read(each))), "")

@@ -215,6 +215,15 @@ def test_guess_of_whole_car(tmp_path, names, head, cells):
     assert places(again) == places(case)
 
 
+def test_guess_of_both_sides_in_words(tmp_path):
+    """The left points are read, as those of names that end in _left."""
+    text = "Name;x;y;z\n" + rows("German", "{} links;{};{};{}")
+    text += rows("German", "{} rechts;{};{};{}", turn=lambda x, y, z: (x, -y, z))
+    case, error = asked(write(tmp_path, text, "car.csv"))
+    assert error.stated["axes"] == "forward,left,up"
+    assert places(case) == places(plain(tmp_path, RACE))
+
+
 FACTS = """
 # Einheit: mm|# Radhalbmesser: 310 mm|# Vorspur: 0,10 °|# Sturz [°]: -1,5
 # units: mm|# wheel_radius: 310|# static_toe: 0.1 deg|# static_camber: -1.5 deg
