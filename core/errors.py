@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Generator, Iterable, Sequence
+import shlex
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
+from pathlib import Path
 
 from .failures import FailureKind
 
@@ -81,6 +83,39 @@ class MechanismError(KincheckError, ValueError):
 
 class CaseError(KincheckError, ValueError):
     """A case file cannot be read or does not follow the schema; the message names file and key."""
+
+
+class OpenError(CaseError):
+    """A file leaves facts open that options of its reader state.
+
+    Attributes:
+        why: the guess of each option, and why, a line each.
+        stated: the guess by the options' fields; reading goes on with it.
+        writes: texts of new files that the options name.
+    """
+
+    def __init__(
+        self, file: Path, why: Sequence[str], stated: Mapping[str, str], writes: Mapping[Path, str]
+    ) -> None:
+        self.file, self.why, self.stated, self.writes = file, why, stated, writes
+        told = " ".join(map(str.strip, why))
+        add = shlex.join(self.options)
+        super().__init__(f"{file} leaves open what options state. Guess: {told} Add: {add}")
+
+    @property
+    def options(self) -> list[str]:
+        """The guess as arguments of the command line."""
+        found = [(f"--{name.replace('_', '-')}", text) for name, text in self.stated.items()]
+        return [each for pair in found for each in pair]
+
+    def with_others(self, other: OpenError) -> OpenError:
+        """Return one question of two."""
+        return OpenError(
+            self.file,
+            [*self.why, *other.why],
+            {**self.stated, **other.stated},
+            {**self.writes, **other.writes},
+        )
 
 
 class SolveError(KincheckError, RuntimeError):

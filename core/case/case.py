@@ -178,6 +178,7 @@ class Origin:
         file: name of the file of the reference; empty without a file.
         sha256: digest of that file.
         own: whether kincheck computed the reference.
+        by_option: whether --reference gave it, and not [reference] of a case file.
         units: units of its columns, by name: the driver, then outputs.
         signs: sign convention of its outputs; empty if only the case's own axes apply.
         grid: places of its values, if not the samples of the sweep.
@@ -188,6 +189,7 @@ class Origin:
     file: str = ""
     sha256: str = ""
     own: bool = False
+    by_option: bool = False
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     signs: str = ""
     grid: str = ""

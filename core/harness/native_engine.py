@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..case.case import Case
-from ..kinematics import LAST_ITERATION, NativeSolver, ProgramSize, Solver, Style
+from ..kinematics import LAST_ITERATION, NATIVE, NativeSolver, ProgramSize, Solver
 from ..program.llvm.machine_code import available
 from ..trajectory import Trajectory, shown
 from ..version import VERSION
@@ -52,7 +52,7 @@ class NativeEngine:
             else "numpy, one call an operation over all lanes"
         )
         last = solver.last_iteration if math.isfinite(solver.last_iteration) else "any"
-        axes = " (global axes)" if solver.style is Style.NATIVE else ""
+        axes = " (global axes)" if solver.style == NATIVE else ""
         return {
             "row_style": f"{solver.style}{axes}",
             "executor": executor,

@@ -27,12 +27,13 @@ Describe:
     kinds, places, placed                           the geometry by name
     LoadPlace, load_places                          masses and loads by name
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
+    formulate, styles, NATIVE, MIXED                the same in a row style
     is_continuation, continuous, regular_between    tests of a step
     motion_defects                                  a motion of bodies against the constraints
 
 The folders:
 
-    formulation      constraints as equations, in Cartesian or joint coordinates
+    formulation      constraints as equations
     structure        degrees of freedom, redundant rows, components, sparse factors
     compiled         one mechanism as compiled programs: request, programs, model, routes
     continuation     the walk along a path, singular poses, curves by arc length
@@ -70,8 +71,9 @@ if TYPE_CHECKING:
         regular_between,
     )
     from .formulation.cartesian import COLUMNS, Cartesian
-    from .formulation.constraints import Frames, Relation, Style, constraints, unit_near
+    from .formulation.constraints import Frames, Relation, constraints, unit_near
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
+    from .formulation.styles import MIXED, NATIVE, formulate, styles
     from .motion_solver import Method, Solver
     from .native_solver import NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import solve
@@ -105,7 +107,8 @@ _NAMES = {
         "LONGEST_TURN ROUNDING is_continuation continuous regular_between"
     ),
     "formulation.cartesian": "COLUMNS Cartesian",
-    "formulation.constraints": "Frames Relation Style constraints unit_near",
+    "formulation.constraints": "Frames Relation constraints unit_near",
+    "formulation.styles": "MIXED NATIVE formulate styles",
     "formulation.parameters": "LoadPlace kinds load_places placed places",
     "native_solver": "NativeSolver PreparedDesigns ProgramSize",
     "motion_solver": "Method Solver",

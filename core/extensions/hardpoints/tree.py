@@ -28,6 +28,7 @@ from .programs import without_comments
 from .table import (
     Hardpoint,
     HardpointTable,
+    angles_and_radius,
     incomplete,
     is_axes,
     length_name,
@@ -37,6 +38,7 @@ from .table import (
     wanted_corner,
 )
 from .templates import ROLES, TEMPLATE_NAMES, agree, compact, corner_of, normal
+from .words import fact, fact_of
 
 FEWEST = 3
 """Fewest points, rows or assignments to recognise a form."""
@@ -48,7 +50,6 @@ _AXIS = re.compile(
     r"(?P<name>.*[^\s_.\-\[(:])(?:[\s_.\-\[(:]+(?P<axis>[xyzXYZ])|(?<=[a-z0-9])(?P<bare>[XYZ]))[\])]?"
 )
 _AXIS_FIRST = re.compile(r"(?P<axis>[xyzXYZ])[\s_.\-:]+(?P<name>.+)")
-_FACT = re.compile(r"#?\s*(unit|axes|template|side)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
 _LAST = ("position", "pos", "coordinates", "coords", "coord", "location", "loc", "xyz", "point")
 _NAMES = ("name", "id", "label", "point")
 # Three numbers that are no place.
@@ -158,12 +159,6 @@ def axis_of(name: str) -> tuple[str, str] | None:
         return None
     parts = found.groupdict()
     return parts["name"].strip(), (parts["axis"] or parts["bare"]).lower()
-
-
-def fact_of(text: str) -> tuple[str, str] | None:
-    """Return the fact in a comment or title, `units: mm`: its name and its value; None without."""
-    found = _FACT.fullmatch(text.strip())
-    return (found[1].lower(), found[2].strip()) if found else None
 
 
 def add_fact(file: Path, where: str, facts: dict[str, str], fact: tuple[str, str]) -> None:
@@ -339,6 +334,7 @@ def table_of(
         *(file, tool, found, facts.get("unit"), facts.get("axes"), facts.get("template"), listed),
         side=facts.get("side") or (corner or ("", ""))[1] or None,
         corner=corner,
+        **angles_and_radius(facts),
     )
 
 
@@ -380,25 +376,32 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
 def _fact_key(leaf: Leaf) -> bool:
     """Return whether a value has the key of a fact."""
     key = normal(leaf.keys[-1]) if leaf.keys else ""
-    return key == "side" or any(key in keys for keys in (_UNIT_KEYS, _AXES_KEYS, _TYPE_KEYS))
+    return (
+        key == "side"
+        or any(key in keys for keys in (_UNIT_KEYS, _AXES_KEYS, _TYPE_KEYS))
+        or fact(key, str(leaf.value)) is not None
+    )
 
 
 def _facts(others: Sequence[Leaf]) -> dict[str, str]:
-    """Return unit, axes and template, if the tree names them."""
+    """Return what the tree states of all points: unit, axes, template, side, radius and angles."""
     facts = dict[str, str]()
     for leaf in others:
-        if not leaf.keys or not isinstance(leaf.value, str):
+        if not leaf.keys or not isinstance(leaf.value, str | int | float):
             continue
-        key, value = normal(leaf.keys[-1]), leaf.value.strip()
-        if key in _UNIT_KEYS:
+        key, value = normal(leaf.keys[-1]), str(leaf.value).strip()
+        name, value = fact(key, value) or ("", value)
+        if key in _UNIT_KEYS or name == "unit":
             if length_name(value) in LENGTHS or key != "length":
                 facts.setdefault("unit", value)
-        elif key in _AXES_KEYS and is_axes(value):
-            facts.setdefault("axes", value)
-        elif key in _TYPE_KEYS and compact(value) in TEMPLATE_NAMES:
-            facts.setdefault("template", value)
-        elif key == "side" and value.lower() in ("left", "right"):
-            facts.setdefault("side", value)
+        elif key in _AXES_KEYS or name == "axes":
+            if is_axes(value):
+                facts.setdefault("axes", value)
+        elif key in _TYPE_KEYS or name == "template":
+            if compact(value) in TEMPLATE_NAMES:
+                facts.setdefault("template", value)
+        elif name and (name != "side" or value.lower() in ("left", "right")):
+            facts.setdefault(name, value)
     return facts
 
 

@@ -7,5 +7,10 @@ EXTENSION = Extension(
     needs=["proofs", "sweep", "compliance", "statics"],
     commands={"bench": "command:BenchAll", "stress": "command:StressEngines"},
     sources={"bench": "source:BenchOfRun"},
+    styles={
+        "paper": "paper.rows:paper",
+        "conventional": "paper.rows:conventional",
+        "relative": "paper.relative:relative",
+    },
     completions={"family": "stress.families:FAMILIES"},
 )
