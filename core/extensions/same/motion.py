@@ -138,7 +138,7 @@ Links: TypeAlias = frozenset[str]
 def joints_by_links(file: Undriven, partner: Mapping[str, str]) -> dict[Links, list[Joint]]:
     """Return the joints of a file by the partners of their links; the ground is its own."""
     found: dict[Links, list[Joint]] = {}
-    for joint in file.mechanism.joints:
+    for joint in file.mechanism.given_joints:
         names = [
             GROUND if file.mechanism.is_fixed(name) else partner.get(name, "")
             for name in joint.bodies
@@ -177,7 +177,7 @@ def tied_links(file: Undriven, partner: Mapping[str, str]) -> dict[Links, str]:
 def measurable(file: Undriven, name: str) -> bool:
     """Return whether a joint of the file has an axis in the mechanism."""
     return any(
-        j.name == name and getattr(j, "axis", None) is not None for j in file.mechanism.joints
+        j.name == name and getattr(j, "axis", None) is not None for j in file.mechanism.given_joints
     )
 
 

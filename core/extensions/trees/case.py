@@ -5,7 +5,7 @@ others held.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -277,7 +277,7 @@ class _Parts:
         for spin in self.spins.values():
             if not spin.is_rod:
                 name = self._free_name(f"{spin.move.inner}: no spin")
-                self.joints[name] = spin.lock(name)
+                self.joints[name] = spin.lock(name, _beside(spin, rods.values()))
                 self.left_out.append(
                     f"turn of body {spin.move.inner!r} about itself: it is a rod between balls"
                 )
@@ -452,6 +452,16 @@ def _locked_moves(tree: Tree) -> set[str]:
     while new := {name for each in couplings for name in each - found if len(each - found) == 1}:
         found |= new
     return found
+
+
+def _beside(spin: Spin, rods: Iterable[Spin]) -> str:
+    """Return a link beside another one that is no rod: if both are, the one behind the first."""
+    behind = {
+        rod.move.inner: next(end.other for end in rod.ends if end.other != spin.move.inner)
+        for rod in rods
+    }
+    others = [end.other for end in spin.ends]
+    return next((each for each in others if each not in behind), "") or behind[others[0]]
 
 
 def _joint_of(closure: Closure, name: str) -> Joint:

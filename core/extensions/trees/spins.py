@@ -65,11 +65,11 @@ class Spin:
         a = np.array([*self.arm], dtype=np.float64)
         return a / np.linalg.norm(a)
 
-    def lock(self, name: str) -> PerpendicularAxes:
-        """Return a joint against the turn about the line, with the link of the first end."""
+    def lock(self, name: str, other: str) -> PerpendicularAxes:
+        """Return a joint against the turn about the line, with another link."""
         f, g, _ = triad(coordinates(self.arm))
         axes = coordinates(f), coordinates(g)
-        return PerpendicularAxes(name, self.ends[0].other, self.move.inner, axes)
+        return PerpendicularAxes(name, other, self.move.inner, axes)
 
 
 def find_spins(tree: Tree, fixed: Collection[str]) -> Mapping[str, Spin]:
