@@ -131,7 +131,8 @@ def regressions(
 
 def time_limit(subject: Subject) -> float:
     """Return the smallest ratio of times that is slower, by the latest runs on the machine."""
-    series = [[time.seconds for time in state.times] for state in subject.states.values()]
+    states = subject.states.values()  # a step is no spread
+    series = [[time.seconds for time in state.times if not time.slower] for state in states]
     return slowest(series, max(map(len, series), default=0))
 
 
@@ -508,8 +509,8 @@ def _slower_on_machine(
         return
     in_loops = [time.seconds / time.loop for time in good if time.loop]
     usual = statistics.median(time.seconds for time in good)
-    # the spread of so few times is unknown
-    limit = limit if len(good) >= ENOUGH else limit**2
+    # the spread of so few times is unknown; what was slower must be seen to be good again
+    limit = limit if open_since or len(good) >= ENOUGH else limit**2
     yield from _slower(
         now, usual, statistics.median(in_loops) if in_loops else None, subject, limit
     )
