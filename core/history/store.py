@@ -35,6 +35,7 @@ from .database import (
     damage_lines,
     explained,
     readable_connection,
+    require_sound,
     writable_connection,
 )
 
@@ -129,16 +130,11 @@ class Store:
         damaged records are passed over.
 
         Args:
-            latest: number of runs whose records are checked, as a report reads them.
+            latest: number of runs whose records are checked, as a report reads them; 0 for none.
         """
         with self.explained("written"):
-            (found,) = self.connection.execute("PRAGMA quick_check(1)").fetchone()
-        if found != "ok":
-            why = found.splitlines()[-1]
-            raise HistoryError(
-                f"history {self.path}: cannot be written: it is damaged ({why}); restore a copy"
-            )
-        for row in self.runs()[:latest]:
+            require_sound(self.connection)
+        for row in self.runs()[:latest] if latest else ():
             with self.sparing(), self.explained("read", row.id):
                 query = "SELECT record FROM records WHERE run_id = ?"
                 for (record,) in self.connection.execute(query, (row.id,)):

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.errors import SolveError
+from kincheck.core.extensions.statics.equations import with_free_coordinates
+from kincheck.core.extensions.statics.equilibrium import StaticModel
 from kincheck.core.joints import Cylindrical, Revolute, Translational
-from kincheck.core.kinematics import LoadPoint, StaticModel, with_free_coordinates
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
@@ -21,10 +22,10 @@ from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq, minimize_scalar
 
-from ..oracles.naive import tilde
-from ..support.mechanisms import ORIGIN, X, Z
+from ...oracles.naive import tilde
+from ...support.mechanisms import ORIGIN, X, Z
 
-DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
+DATA = Path(__file__).parents[2] / "data" / "elastokinematics"
 
 
 def read(name):
@@ -51,7 +52,7 @@ def three(facts):
 
 def block(bushings):
     return StaticModel(
-        Mechanism("block", [Body("block")], [], forces=bushings), [LoadPoint("o", "block", ORIGIN)]
+        Mechanism("block", [Body("block")], [], forces=bushings), [Point("o", "block", ORIGIN)]
     )
 
 
@@ -118,7 +119,7 @@ ELEMENTS = {
 @pytest.mark.parametrize("name", ELEMENTS)
 def test_equilibrium_angle_of_loaded_arm(name):
     element, load, angle = ELEMENTS[name]
-    model = StaticModel(replace(ARM, forces=[element]), [LoadPoint("tip", "arm", (0.4, 0.0, 0.0))])
+    model = StaticModel(replace(ARM, forces=[element]), [Point("tip", "arm", (0.4, 0.0, 0.0))])
     found = model.solve({"tip": np.array([[0.0, load, 0.0, 0.0, 0.0, 0.0]])}, {})
     assert found.reached.all()
     x, y, _ = found.direction("arm", X)[0]
@@ -175,7 +176,7 @@ def test_load_beyond_snap_through_is_refused(a, h, stiffness, side):
     loads = np.zeros((len(factors), 6))
     loads[:, 2] = -factors * limit
     for body, place in bodies.items():
-        found = StaticModel(mechanism, [LoadPoint("p", body, place)]).solve({"p": loads}, {})
+        found = StaticModel(mechanism, [Point("p", body, place)]).solve({"p": loads}, {})
         assert found.reached.tolist() == [x < 1.0 for x in factors]
         assert (found.share * factors)[2:] == pytest.approx([1.0] * 5, rel=1e-8)
         heights = found.place("slider", at)[:2, 2]
@@ -189,7 +190,7 @@ def test_torque_beyond_dead_centre_is_refused():
     r, d, k = 0.2, 0.5, 4e3
     base = (0.6 * d, 0.8 * d, 0.0)
     spring = SpringDamper("s", "arm", GROUND, ((r, 0.0, 0.0), base), k, free_length=0.0)
-    model = StaticModel(replace(ARM, forces=[spring]), [LoadPoint("o", "arm", ORIGIN)])
+    model = StaticModel(replace(ARM, forces=[spring]), [Point("o", "arm", ORIGIN)])
     # at rest it points to the base; turned from there, the torque k r d sin(turn) holds it
     loads = np.zeros((4, 6))
     loads[:, 5] = k * r * d * np.array([-0.7, 0.999, 1.001, 40.0])
@@ -218,7 +219,7 @@ def strut(factor=1.0, turning=1.0, rigid=False):
         forces=[*given.forces, *bushings],
     )
     patch = tuple(facts["contact_patch"])
-    return StaticModel(mechanism, [LoadPoint("patch", "knuckle", patch)]), facts
+    return StaticModel(mechanism, [Point("patch", "knuckle", patch)]), facts
 
 
 def test_strut_equilibrium_agrees_with_simulators():
@@ -320,7 +321,7 @@ def test_soft_upright_pendulum_is_unstable():
             forces=[TorsionSpringDamper("coil", "hinge", stiffness)],
             gravity=(0.0, -10.0, 0.0),
         )
-        model = StaticModel(mechanism, [LoadPoint("o", "arm", ORIGIN)])
+        model = StaticModel(mechanism, [Point("o", "arm", ORIGIN)])
         return model.solve({"o": np.zeros((1, 6))}, {}).unstable[0]
 
     assert least(10.5) == ""

@@ -7,6 +7,7 @@ by user functions, of displacement and rotation as Exudyn measures them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,12 @@ from ...core.case.case import Case
 from ...core.forces import Forces
 from ...core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
 from ...core.trajectory import Array, Trajectory
-from ..shared.equilibrium import Rest, equilibria
+from ..exudyn.exudyn import Exudyn, Loads
+from ..exudyn.rows import System
 from ..shared.force_solution import elastic_force, elastic_forces, elastic_torque
 from ..shared.poses import frame_along
-from .exudyn import Exudyn, Loads
-from .rows import System
-from .solvers import Coordinates, DriverTable, Solver
+from ..simulate.exudyn_solvers import Coordinates, DriverTable, Solver
+from .walk import Rest, equilibria
 
 # Tolerance of Newton on forces out of balance, as a part of the largest stiffness and load: the
 # round-off of positions of a metre, which stiffness turns into forces.
@@ -224,3 +225,6 @@ class StaticSolver(Solver):
         return equilibria(
             case, lambda each, group: Statics(Exudyn().with_known_joints(each)).solve(group)
         )
+
+
+static = partial(StaticSolver, "exudyn-static", "static", modified=False)

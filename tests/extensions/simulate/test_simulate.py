@@ -24,8 +24,8 @@ from kincheck.core.harness.record import Outcome, from_json
 from kincheck.core.harness.run import run
 from kincheck.core.mechanism.motions import Sine
 
-from ..support.engine_motion import installed, mechanism_of, motion_case
-from ..support.mechanisms import ORIGIN, X, Y, Z, mcpherson
+from ...support.engine_motion import installed, mechanism_of, motion_case
+from ...support.mechanisms import ORIGIN, X, Y, Z, mcpherson
 
 
 def record(case, engine):

@@ -11,15 +11,14 @@ from kincheck.core.case.measures import ElementForce
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.execution import Pair, attempt
 from kincheck.core.joints import Revolute, Translational
-from kincheck.core.kinematics import LoadPoint
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from ..support.engine_motion import SIMULATORS, installed, motion_case
-from ..support.mechanisms import Z
+from ...support.engine_motion import SIMULATORS, installed, motion_case
+from ...support.mechanisms import Z
 
 ORIGIN, Z = (0.0, 0.0, 0.0), Z
 STOP = ((-0.1, -100.0), (0.0, 0.0), (0.1, 100.0), (0.1001, 120.0), (0.2, 18100.0))
@@ -42,7 +41,7 @@ def held_in(mechanism, place, force):
         case,
         mechanism=with_markers(mechanism, outputs),
         outputs=outputs,
-        balance=Balance((LoadPoint(place.name, place.body, place.position),), loads),
+        balance=Balance((Point(place.name, place.body, place.position),), loads),
     )
 
 

@@ -25,17 +25,19 @@ from numpy.typing import NDArray
 
 from ...algebra import quat, vec
 from ...errors import SolveError
-from ...forces import Forces, Reaction
-from ...mechanism.mechanism import Mechanism
-from ...primitives.base import Pose
+from ...forces import Forces, Multipliers, Reaction, in_wrenches
+from ...kinematics.compiled.request import slots_of
+from ...kinematics.forces.equations import BodyStates, ForceEquations
+from ...kinematics.forces.reactions import free_wrench
+from ...kinematics.formulation.cartesian import COLUMNS, Cartesian
+from ...kinematics.formulation.constraints import constraints_left_out
+from ...kinematics.formulation.state_vectors import columns_of, dense, placed_bodies
+from ...mechanism.mechanism import Mechanism, Point
+from ...primitives.base import Drive, Pose
 from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode
 from ...program.llvm.machine_code import available
 from ...trajectory import Array, BodyMotion
-from ..compiled.request import slots_of
-from ..forces.equations import BodyStates
-from ..formulation.cartesian import COLUMNS
-from ..formulation.state_vectors import columns_of, placed_bodies
 from .equations import (
     BY,
     DETERMINANT,
@@ -47,7 +49,6 @@ from .equations import (
     REST,
     SIGNS,
     STEP,
-    LoadPoint,
     StaticEquations,
     motion_of,
     null_space,
@@ -96,6 +97,7 @@ class Equilibria:
         iterations: Newton iterations, shape (n,).
         wanted: by force element or joint, the amount, shape (1, n), or force and moment on the
             second body, shape (6, n) [N, N m].
+        held: the numbers of held drivers, by name, shape (3, n).
     """
 
     model: StaticModel
@@ -109,24 +111,57 @@ class Equilibria:
     unstable: Sequence[str]
     iterations: NDArray[np.int64]
     wanted: Mapping[str, Array]
+    held: Mapping[str, Array]
 
-    @property
+    @cached_property
     def forces(self) -> Forces:
-        """The wanted forces; of redundant rows some carry all, so then no reaction is unique."""
-        n, wanted = len(self.share), self.model.equations.wanted
-        whole = np.eye(6)[:, : 6 * bool(self.model.equations.dropped)]
-        free, unknown = np.broadcast_to(whole, (n, *whole.shape)), np.full(n, np.nan)
+        """The wanted forces. Of redundant rows some carry all: a rank test tells what else does."""
+        n, equations = len(self.share), self.model.equations
+        unknown, wanted = np.full(n, np.nan), equations.wanted
+        free, known = self._free() if wanted.joints else ({}, unknown)
 
-        def reaction(values: Array) -> Reaction:
-            return Reaction(values[:3].T, values[3:].T, free, np.zeros(n))
+        def reaction(name: str) -> Reaction:
+            values = self.wanted[name]
+            return Reaction(values[:3].T, values[3:].T, free[name], known)
 
         return Forces(
-            {name: reaction(self.wanted[name]) for name in wanted.joints},
+            {name: reaction(name) for name in wanted.joints},
             self.efforts,
             {name: self.wanted[name][0] for name in wanted.elements},
             unknown,
             unknown,
         )
+
+    def _free(self) -> tuple[dict[str, Array], Array]:
+        """Return the undetermined directions of the wanted joints' wrenches, and `Reaction.known`,
+        which is NaN at singular poses.
+        """
+        mechanism, equations, n = self.model.mechanism, self.model.equations, len(self.share)
+        joints = [mechanism.joint(name) for name in equations.wanted.joints]
+        if not (equations.dropped or mechanism.reduced):
+            return {joint.name: np.empty((n, 6, 0)) for joint in joints}, np.zeros(n)
+        formulation = equations.formulated(
+            {name: Drive(c, 0.0, 0.0, *half) for name, (c, *half) in self.held.items()}
+        )
+        left_out = Cartesian(constraints_left_out(mechanism, equations.frame), formulation.bodies)
+        state = {name: [*values] for name, values in self.states.items()}
+        rows = ForceEquations(
+            mechanism, formulation, formulation.configuration(state), self._at, {}, left_out
+        )
+        matrix, last = dense(rows.rows, formulation.unknowns, n), len(formulation.owners)
+        found = Multipliers.of(
+            matrix,
+            np.zeros((n, formulation.unknowns)),
+            range(last - len(mechanism.drivers), last),
+            matrix.shape[1] - last,
+            formulation.unknowns - len(equations.chosen),
+        )
+        if mechanism.reduced:
+            joints = mechanism.given_joints
+        free = {joint.name: free_wrench(rows, joint, found) for joint in joints}
+        if mechanism.reduced:
+            free = in_wrenches(free, found.known)
+        return free, np.where(found.singular, np.nan, found.known)
 
     @cached_property
     def _at(self) -> BodyStates:
@@ -196,7 +231,7 @@ class StaticModel:
     def __init__(
         self,
         mechanism: Mechanism,
-        loads: Sequence[LoadPoint] = (),
+        loads: Sequence[Point] = (),
         forces: Collection[str] = (),
     ) -> None:
         self.mechanism, self.equations = mechanism, StaticEquations(mechanism, loads, forces)
@@ -254,7 +289,8 @@ class StaticModel:
         n = next((len(each) for each in (*loads.values(), *travel.values())), 1)
         kept = [*self.equations.design, EFFORTS]
         if slopes:
-            kept += [name for name in self.equations.vectors if name.startswith((BY, FORCE))]
+            wanted = (BY, FORCE, DRIVE)
+            kept += [name for name in self.equations.vectors if name.startswith(wanted)]
             kept += ["tangent"]
         ends = [0, *np.cumsum([len(self.equations.vectors[name]) for name in kept]).tolist()]
         parts = [
@@ -400,6 +436,7 @@ class StaticModel:
             unstable,
             iterations,
             {k.removeprefix(FORCE): x for k, x in found.items() if k.startswith(FORCE)},
+            {k.removeprefix(DRIVE): x for k, x in found.items() if k.startswith(DRIVE)},
         )
 
     def _stability(self, entries: Array) -> tuple[Array, list[str]]:

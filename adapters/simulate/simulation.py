@@ -32,13 +32,13 @@ from ...core.kinematics import start_of as where_from
 from ...core.mechanism.mechanism import Vector
 from ...core.mechanism.motions import outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
-from .constraints import closure_conditions, closure_text
-from .equivalents import fits, with_joints_alone
-from .projection import Walk
-from .projection_engine import ProjectionEngine
-from .projection_model import ProjectionModel
-from .tree_model import TreeModel
-from .tree_plan import Closure, relations
+from ..shared.constraints import closure_conditions, closure_text
+from ..shared.equivalents import fits, with_joints_alone
+from ..shared.projection import Walk
+from ..shared.projection_engine import ProjectionEngine
+from ..shared.projection_model import ProjectionModel
+from ..shared.tree_model import TreeModel
+from ..shared.tree_plan import Closure, relations
 
 # A loop that is open by more than this fraction of the mechanism's size is torn: the pose does not
 # belong to the mechanism. The softest simulator, MuJoCo with default settings, stays below it on

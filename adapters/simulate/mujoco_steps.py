@@ -11,6 +11,7 @@ import math
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -19,9 +20,9 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.mechanism.motions import Ramp
 from ...core.trajectory import Array, Trajectory
+from ..mujoco.mujoco import MuJoCo, MuJoCoModel, mujoco
 from ..shared.equivalents import with_joints_alone
-from ..shared.simulation import Leg, SimulatedPose, Simulation, SimulationEndedError, start_of
-from .mujoco import MuJoCo, MuJoCoModel, mujoco
+from .simulation import Leg, SimulatedPose, Simulation, SimulationEndedError, start_of
 
 # Inertia of driven coordinates [kg or kg m2] next to bodies with unit inertia: reactions change
 # their motion by a billionth.
@@ -223,3 +224,8 @@ class _Steps:
                     rate(m, d, mj.mjtObj.mjOBJ_SITE, frame.handle, self.twist, 0)
                     points[order, k] = self.twist[3:]
         return SimulatedPose(points, float(np.abs(d.efc_pos[: d.ne]).max(initial=0.0)), steps)
+
+
+stiff = partial(Stepping, "mujoco", "stiff", 4)
+default = partial(Stepping, "mujoco-default", "default", 1)
+projecting = partial(Stepping, "mujoco-projecting", "projecting", 5)

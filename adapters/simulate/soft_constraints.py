@@ -4,7 +4,7 @@ MuJoCo's constraints are soft, so its forces differ from the engine's forces, th
 exact rows. At a pose, with velocities and applied forces of the exact motion, MuJoCo finds its own
 accelerations; its tendon equality, which models a rod, has no Jdot v. Run:
 
-    python -m kincheck.adapters.mujoco.soft_constraints CASE.toml
+    python -m kincheck.adapters.simulate.soft_constraints CASE.toml
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ...core.case.io.case_file import load_case
 from ...core.errors import CaseError, KincheckError
 from ...core.kinematics import start_of
 from ...core.trajectory import Array
+from ..mujoco.mujoco import MuJoCo, MuJoCoModel
 from ..shared.equivalents import own_frame
 from ..shared.projection import Walk
-from .mujoco import MuJoCo, MuJoCoModel
 
 # solref and solimp of every equality: MuJoCo's own, and nearly rigid.
 SOFTNESS: Mapping[str, tuple[Sequence[float], Sequence[float]]] = {
@@ -158,7 +158,8 @@ def main(arguments: Sequence[str]) -> int:
     """Print the forces of every rod of a case file; return the exit status."""
     if len(arguments) != 1:
         print(
-            "usage: python -m kincheck.adapters.mujoco.soft_constraints CASE.toml", file=sys.stderr
+            "usage: python -m kincheck.adapters.simulate.soft_constraints CASE.toml",
+            file=sys.stderr,
         )
         return 2
     try:

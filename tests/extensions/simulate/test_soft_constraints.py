@@ -10,7 +10,7 @@ from kincheck.core.errors import CaseError
 
 pytest.importorskip("mujoco")
 
-from kincheck.adapters.mujoco.soft_constraints import main, report_lines, rod_forces
+from kincheck.adapters.simulate.soft_constraints import main, report_lines, rod_forces
 
 STRUT = cases.load("mcpherson_strut_loaded")
 

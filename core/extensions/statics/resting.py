@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...algebra import Vec3
+from ...case.case import TIME, Case, Sweep, pace, size
+from ...case.io.outputs import default, largest_load
+from ...case.measures import DriverEffort, coordinate_of
+from ...case.quantity import point_jets, still_jets, with_markers
 from ...errors import CaseError, MechanismError
-from ...kinematics import Equilibria, StaticModel, with_free_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Motion, Ramp, Table
 from ...trajectory import Array, PointMotion
-from ..case import TIME, Case, Resting, Sweep, pace, size
-from ..measures import DriverEffort, coordinate_of
-from ..quantity import point_jets, still_jets, with_markers
-from .outputs import default, largest_load
+from .equations import with_free_coordinates
+from .equilibrium import Equilibria, StaticModel
 
 
-def at_rest(case: Case, resting: Resting) -> Case:
+def at_rest(case: Case, held_names: Sequence[str]) -> Case:
     """Return the case at rest: its free drivers follow the equilibrium with gravity and springs.
 
     The native engine finds the poses, at each value of a held driver that is swept, else one. All
@@ -31,13 +33,13 @@ def at_rest(case: Case, resting: Resting) -> Case:
     """
     mechanism, sweep = with_free_coordinates(case.mechanism), case.sweep
     moving = {*sweep.motions, sweep.driver} - {TIME}
-    if loose := sorted(moving - {*resting.held}):
+    if loose := sorted(moving - {*held_names}):
         raise CaseError(
             f"case {case.name!r}: driver {loose[0]!r} moves, and [equilibrium] leaves it free; name"
             " it in held, or take its motion and sweep out"
         )
-    held = [each for each in mechanism.drivers if each.name in resting.held]
-    free = [each for each in mechanism.drivers if each.name not in resting.held]
+    held = [each for each in mechanism.drivers if each.name in held_names]
+    free = [each for each in mechanism.drivers if each.name not in held_names]
     path = replace(sweep, rate=sweep.rate or 1.0).path
     travel = {
         name: motion.at(path.times)[0] for name, motion in path.motions.items() if name != TIME
@@ -62,7 +64,7 @@ def at_rest(case: Case, resting: Resting) -> Case:
     return replace(case, mechanism=mechanism, sweep=at, assembly=assembly)
 
 
-def with_efforts(case: Case, resting: Resting) -> Case:
+def with_efforts(case: Case, held_names: Sequence[str]) -> Case:
     """Return the case with the efforts of its free drivers as outputs: they vanish where a
     simulator's own forces are in equilibrium.
     """
@@ -75,7 +77,7 @@ def with_efforts(case: Case, resting: Resting) -> Case:
     efforts = [
         DriverEffort(f"{each.name}.effort", *scales[each.turns], driver=each.name).bound(mechanism)
         for each in mechanism.drivers
-        if each.name not in resting.held and f"{each.name}.effort" not in known
+        if each.name not in held_names and f"{each.name}.effort" not in known
     ]
     outputs = (*case.outputs, *efforts)
     return replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)

@@ -26,12 +26,11 @@ large and sparse.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeAlias
 
-from ...algebra import (
+from ....algebra import (
     ZERO,
     Quat,
     Scalar,
@@ -45,7 +44,7 @@ from ...algebra import (
     turned_by,
     vec,
 )
-from ...joints import (
+from ....joints import (
     Cylindrical,
     Fixed,
     Joint,
@@ -55,14 +54,9 @@ from ...joints import (
     Translational,
     Universal,
 )
-from ...joints.base import unit
-from ...mechanism.mechanism import GROUND, Mechanism
-from ...mechanism.tree import Branch, spanning_tree
-from ...primitives.base import GROUND_POSE, GROUND_TWIST, Pose, Twist
-from ...program import cos, sin
-from .cartesian import COLUMNS, Cartesian
-from .constraints import Constraint, Frames, Relation
-from .formulation import (
+from ....joints.base import unit
+from ....kinematics import COLUMNS, Cartesian, Frames, Relation, constraints
+from ....kinematics.formulation.formulation import (
     GROUND_ACCELERATION,
     Acceleration,
     Condition,
@@ -70,6 +64,10 @@ from .formulation import (
     Rows,
     State,
 )
+from ....mechanism.mechanism import GROUND, Mechanism
+from ....mechanism.tree import Branch, spanning_tree
+from ....primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Twist
+from ....program import cos, sin
 
 BALL = 3
 """Unknowns of a ball."""
@@ -206,35 +204,33 @@ class TreeConfiguration(Configuration):
         return (origins[name] - column.P_design) + (self.poses[name].u - column.P)
 
 
-@dataclass(frozen=True, eq=False)
-class Relative:
-    """A tree and the constraints that close it; see `Cartesian`.
+def relative(
+    mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], named: Collection[str]
+) -> Relative:
+    """Return the formulation of the row style; see `kinematics.formulation.styles`."""
+    found = constraints(mechanism, frame, drives, named, mixed=True)
+    chains, used = _chains(mechanism, frame)
+    left = [c for c in found if isinstance(c, Relation) or c.owner not in used]
+    names = tuple(
+        step.name.removeprefix("x ")
+        for chain in chains
+        for step in chain.steps
+        if step.axis is not None
+    )
+    return Relative(left, frame.moving, names, chains=chains, origins=frame.origins)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Relative(Cartesian):
+    """A tree, and the Cartesian equations of the constraints that close it.
 
     Attributes:
         chains: of all moving bodies, parents first.
-        closed: the other constraints, in Cartesian form; its named coordinates are those of the
-            tree, then its own.
+        origins: of the bodies at design [units].
     """
 
     chains: Sequence[Chain]
-    closed: Cartesian
     origins: Mapping[str, Vec3]
-
-    @staticmethod
-    def of(mechanism: Mechanism, frame: Frames, found: Sequence[Constraint | Relation]) -> Relative:
-        """Return the formulation of a mechanism from its constraints in the mixed style.
-
-        The constraints of tree joints are dropped.
-        """
-        chains, used = _chains(mechanism, frame)
-        left = [c for c in found if isinstance(c, Relation) or c.owner not in used]
-        names = tuple(
-            step.name.removeprefix("x ")
-            for chain in chains
-            for step in chain.steps
-            if step.axis is not None
-        )
-        return Relative(chains, Cartesian(left, frame.moving, names), frame.origins)
 
     @cached_property
     def _columns(self) -> Mapping[str, int]:
@@ -243,7 +239,7 @@ class Relative:
         """
         found, count = dict[str, int](), 0
         steps = (step.name for chain in self.chains for step in chain.steps)
-        for name in (*steps, *(f"x {name}" for name in self.closed.coordinates)):
+        for name in (*steps, *(f"x {name}" for name in self.coordinates)):
             if name not in found:
                 found[name] = count
                 count += BALL if name.startswith(BALLS) else 1
@@ -261,13 +257,9 @@ class Relative:
         }
 
     @property
-    def owners(self) -> Sequence[tuple[str, str]]:
-        return self.closed.owners
-
-    @property
     def conditions(self) -> Sequence[Condition]:
         # no joint in these rows carries another loop
-        return [replace(each, remote=0) for each in self.closed.conditions]
+        return [replace(each, remote=0) for each in super().conditions]
 
     def configuration(self, state: State) -> Configuration:
         """Compute poses and columns by recursion from the ground."""
@@ -307,31 +299,22 @@ class Relative:
                 after[name] = (value[0] + step[k],)
         return after
 
-    def phi(self, at: Configuration) -> list[Scalar]:
-        return self.closed.phi(at)
-
-    def branch(self, at: Configuration) -> list[Scalar]:
-        return self.closed.branch(at)
-
     def rows(self, at: Configuration) -> Rows:
-        return [self._transform(row, _of_tree(at)) for row in self.closed.rows(at)]
-
-    def nu(self, at: Configuration) -> list[Scalar]:
-        return self.closed.nu(at)
+        return [self._transform(row, _of_tree(at)) for row in super().rows(at)]
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
         moved = self._motions(at, v, [0.0] * len(v))
-        rates, bias = [0.0] * self.closed.unknowns, [0.0] * self.closed.unknowns
-        for name, k in self.closed.columns.items():
+        rates, bias = [0.0] * super().unknowns, [0.0] * super().unknowns
+        for name, k in self.columns.items():
             twist, acceleration = moved[name]
             rates[k : k + COLUMNS] = [*twist.v, *twist.w]
             bias[k : k + COLUMNS] = [*acceleration.v_t, *acceleration.w_t]
-        for name, k in self.closed.coordinates.items():
+        for name, k in self.coordinates.items():
             rates[k] = v[self._columns[f"x {name}"]]
-        rows = self.closed.rows(at)
+        rows = super().rows(at)
         return [
             value - sum((entry * bias[k] for k, entry in row.items()), 0.0)
-            for value, row in zip(self.closed.gamma(at, rates), rows, strict=True)
+            for value, row in zip(super().gamma(at, rates), rows, strict=True)
         ]
 
     def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
@@ -383,7 +366,7 @@ class Relative:
     def _transform(self, row: Mapping[int, Scalar], at: TreeConfiguration) -> dict[int, Scalar]:
         """Return a Cartesian row times B, over the unknowns that move a body of the row."""
         entries: dict[int, Scalar] = {}
-        for name, first in self.closed.columns.items():
+        for name, first in self.columns.items():
             r = Vec3(*(row.get(first + k, 0.0) for k in range(3)))
             p = Vec3(*(row.get(first + k, 0.0) for k in range(3, COLUMNS)))
             if all(map(is_literal_zero, (*r, *p))):
@@ -395,7 +378,7 @@ class Relative:
                 if not column.slides:
                     value = (p + cross(at.arm(name, column, self.origins), r)) @ column.axis
                 entries[k] = entries.get(k, 0.0) + value
-        for name, k in self.closed.coordinates.items():
+        for name, k in self.coordinates.items():
             if k in row:
                 own = self._columns[f"x {name}"]
                 entries[own] = entries.get(own, 0.0) + row[k]
@@ -412,16 +395,3 @@ def _weighted_sum(weights: Sequence[Scalar], axes: Sequence[Vec3]) -> Vec3:
     for weight, axis in zip(weights, axes, strict=True):
         total = total + weight * axis
     return total
-
-
-Formulation: TypeAlias = Cartesian | Relative
-"""The equations of a mechanism over the unknowns of one formulation.
-
-Newton's iteration, velocities, accelerations, prediction and row selection are written once, for
-both; see `Cartesian`.
-"""
-
-
-def row_names(formulation: Formulation) -> list[str]:
-    """Return a readable name of every row: its joint or driver, and its primitive."""
-    return [f"{owner}: {primitive}" for owner, primitive in formulation.owners]

@@ -16,7 +16,7 @@ equations. `rest` is the unbalance at design, taken away little by little.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from typing import Any
 
@@ -25,8 +25,18 @@ import numpy as np
 from ...algebra import ZERO, Scalar, cross, is_literal_zero, vec
 from ...errors import SolveError
 from ...joints import AxialJoint
+from ...kinematics.compiled.request import Layout
+from ...kinematics.compiled.traced_forces import angles
+from ...kinematics.forces.equations import BodyStates, ForceEquations
+from ...kinematics.forces.wanted import wanted_forces
+from ...kinematics.formulation.cartesian import Cartesian
+from ...kinematics.formulation.constraints import frames
+from ...kinematics.formulation.formulation import GROUND_ACCELERATION, Configuration
+from ...kinematics.formulation.state_vectors import jacobian as rows_at
+from ...kinematics.formulation.state_vectors import moved_most
+from ...kinematics.structure.redundancy import independent_rows
 from ...mechanism.loads import TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.mechanism import Mechanism, Point
 from ...mechanism.motions import Driver, JointAngle, JointDisplacement, JointDriver
 from ...primitives.base import Drive, Twist
 from ...program import (
@@ -41,15 +51,6 @@ from ...program import (
 from ...program.llvm.executor import Executor
 from ...program.tape import folded, jacobian
 from ...trajectory import Array
-from ..compiled.request import Layout
-from ..compiled.traced_forces import angles
-from ..forces.equations import BodyStates, ForceEquations
-from ..forces.wanted import wanted_forces
-from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import frames
-from ..formulation.formulation import GROUND_ACCELERATION, Configuration
-from ..formulation.state_vectors import jacobian as rows_at
-from ..structure.redundancy import independent_rows
 
 STEP, SIGNS, DETERMINANT = "step", "signs", "determinant"
 """Slots: the largest component of the step, and signs and size of the blocks' determinants."""
@@ -70,15 +71,6 @@ FORCE = "force of "
 FREE = 1e-11
 # A motion turns a body rather than moves it, if it turns by more than this per unit of length.
 TURNS = 1e-3
-
-
-@dataclass(frozen=True)
-class LoadPoint:
-    """A place of loads: a force at a point carried by a body, and a torque."""
-
-    name: str
-    body: str
-    position: Vector
 
 
 class StaticEquations:
@@ -107,7 +99,7 @@ class StaticEquations:
     def __init__(
         self,
         mechanism: Mechanism,
-        loads: Sequence[LoadPoint] = (),
+        loads: Sequence[Point] = (),
         forces: Collection[str] = (),
     ) -> None:
         self.wanted = wanted_forces(mechanism, forces)
@@ -127,7 +119,7 @@ class StaticEquations:
         for driver in mechanism.drivers:
             value, *half = self._vector(f"{DRIVE}{driver.name}", 3)
             self._drives[driver.name] = Drive(value, 0.0, 0.0, *half)
-        self._formulation = formulation = self._formulate(self._drives)
+        self._formulation = formulation = self.formulated(self._drives)
         self.design, self.columns = formulation.design, formulation.columns
         self._now = formulation.configuration(
             {name: self._vector(name, len(value)) for name, value in self.design.items()}
@@ -136,7 +128,8 @@ class StaticEquations:
         self.order = self.unknowns + len(self.chosen)
         self.plan = self._programs()
 
-    def _formulate(self, drives: Mapping[str, Drive]) -> Cartesian:
+    def formulated(self, drives: Mapping[str, Drive]) -> Cartesian:
+        """Return the formulation with the numbers of the held drivers."""
         return Cartesian.of(self.mechanism, self.frame, drives, named=angles(self.mechanism))
 
     def _vector(self, name: str, count: int) -> list[Any]:
@@ -151,7 +144,7 @@ class StaticEquations:
         Raises:
             SolveError: joints or other drivers hold the coordinate of a driver already.
         """
-        drivers, at_rest = self.mechanism.drivers, self._formulate({})
+        drivers, at_rest = self.mechanism.drivers, self.formulated({})
         matrix = rows_at(at_rest)
         first = len(matrix) - len(drivers)
         rank = len(independent_rows(matrix[:first], 0))
@@ -373,14 +366,6 @@ def null_space(rows: Array, unknowns: int) -> Array:
     if not len(rows):
         return np.eye(unknowns)
     return np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
-
-
-def moved_most(columns: Mapping[str, int], motion: Array) -> tuple[str, Array]:
-    """Return the body moved most by a motion of the unknowns, and its part (dr, dpi)."""
-    name, first = max(
-        columns.items(), key=lambda each: float(np.linalg.norm(motion[each[1] : each[1] + COLUMNS]))
-    )
-    return name, motion[first : first + COLUMNS]
 
 
 def motion_of(columns: Mapping[str, int], motion: Array) -> str:

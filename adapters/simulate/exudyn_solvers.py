@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,11 @@ from ...core.kinematics import start_of as where_from
 from ...core.mechanism.mechanism import GROUND
 from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...core.trajectory import Array
+from ..exudyn.exudyn import Exudyn, ExudynModel
+from ..exudyn.rows import Rows, System
 from ..shared.exudyn_joints import objects_of
-from ..shared.simulation import (
+from ..shared.tree_plan import ends_of
+from .simulation import (
     Leg,
     SimulatedPose,
     Simulation,
@@ -29,9 +33,6 @@ from ..shared.simulation import (
     start_of,
     uneven_samples,
 )
-from ..shared.tree_plan import ends_of
-from .exudyn import Exudyn, ExudynModel
-from .rows import Rows, System
 
 
 class DriverTable:
@@ -371,3 +372,8 @@ class _Solved:
     def sensor_values(self, sensor: int) -> Array:
         """Return the stored values of a sensor without the times, shape (steps + 1, values)."""
         return np.array(self.mbs.GetSensorStoredData(sensor))[:, 1:]
+
+
+trapezoidal = partial(Solver, "exudyn", "trapezoidal", steps=4)
+alpha = partial(Solver, "exudyn-alpha", "generalized alpha", steps=4)
+modified = partial(Solver, "exudyn-static-modified", "static")

@@ -20,15 +20,16 @@ from typing import Any
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.errors import SolveError
+from ...core.errors import SolveError, UnsupportedError
 from ...core.failures import FailureKind
 from ...core.forces import Forces
 from ...core.mechanism.loads import Force, ForceElement, Torque
 from ...core.trajectory import Array, PointMotion, Trajectory
-from .equivalents import own_frame
-from .force_solution import places, solved_forces
-from .projection import RANK_TOLERANCE
-from .projection_model import ProjectionModel, SolvedPose
+from ..shared.equivalents import own_frame
+from ..shared.force_solution import places, solved_forces
+from ..shared.projection import RANK_TOLERANCE
+from ..shared.projection_engine import ProjectionEngine
+from ..shared.projection_model import ProjectionModel, SolvedPose
 
 # As in the native walk: the ratio of two corrections that proves a solution nearby (Kantorovich),
 # a correction whose square is round-off, and round-off.
@@ -262,3 +263,15 @@ class Walk:
                 " bushing"
             ) from None
         return step, int((values < 0.0).sum())
+
+
+def of_engine(engine: ProjectionEngine, case: Case) -> Trajectory:
+    """Return the equilibria of a case; see `harness.engine.Balancing`."""
+
+    def solve(case: Case, group: Sequence[int]) -> tuple[Mapping[int, Rest], Forces, str]:
+        model = engine.build(case)
+        if not case.forces:
+            raise UnsupportedError(f"{engine.title} gives no forces of case {case.name!r}")
+        return Walk(model, engine.with_known_joints(case)).solve(group)
+
+    return equilibria(case, solve)
