@@ -34,11 +34,11 @@ from .queries import (
     Entry,
     History,
     calibration,
+    last_alike,
     present_names,
     read,
-    same_task,
 )
-from .states import RECENT, State, accepted_in, base_record, state_before
+from .states import RECENT, State, accepted_in, base_record, state_before, vanished
 from .steps import (
     ENOUGH,
     HEADROOM,
@@ -58,7 +58,7 @@ from .steps import (
     steps,
     with_crept,
 )
-from .store import Pair, Store
+from .store import Pair, RunRow, Store
 from .subjects import Subject
 from .values import largest, largest_difference, quantities, same_samples, values_of
 
@@ -100,12 +100,15 @@ def regressions(
         number = -math.inf if against.number is None else against.number
         found += compare(subject, against, _on_machine(subject, around, before=number + 1), limit)
         found = with_crept(subject, found)
-    found += _find_missing(subject, store, found)
+    last = last_alike(store.runs() if store else (), subject.before, subject.facts)
+    gone = _vanished(subject, last, store)
+    found += _find_missing(subject, last, [*found, *gone])
     if against is not None and against.bases and store is not None:
         found = [_of_state(finding, subject, against, store) for finding in found]
-        found = [_renamed(finding, subject, store, found) for finding in found]
+        found = [_renamed(finding, subject, store, [*found, *gone]) for finding in found]
     else:
         found = [_since(finding, standing) for finding in found]
+    found += gone
     return Regressions(
         run=subject.label,
         against=against.label if against else None,
@@ -128,7 +131,8 @@ def regressions(
 
 def time_limit(subject: Subject) -> float:
     """Return the smallest ratio of times that is slower, by the latest runs on the machine."""
-    series = [[time.seconds for time in state.times] for state in subject.states.values()]
+    states = subject.states.values()  # a step is no spread
+    series = [[time.seconds for time in state.times if not time.slower] for state in states]
     return slowest(series, max(map(len, series), default=0))
 
 
@@ -208,7 +212,7 @@ def _renamed(finding: Finding, subject: Subject, store: Store, found: Sequence[F
         return finding
     for gone in found:
         pair = (gone.case, *finding.pair[1:])
-        if gone.kind is not Kind.ABSENT or gone.pair != pair:
+        if gone.kind not in (Kind.ABSENT, Kind.LOST) or gone.pair != pair:
             continue
         state = state_before(store, pair, subject.before, subject.facts)
         with store.sparing():
@@ -236,21 +240,39 @@ def _alike(a: Record, b: Record) -> bool:
     )
 
 
+def _vanished(subject: Subject, last: RunRow | None, store: Store | None) -> list[Finding]:
+    """Return the pairs that were worse in the last run of the same selection and are not in this
+    one: a fault does not go with its case.
+    """
+    if store is None:
+        return []
+    found = vanished(store, last, subject.facts, subject.pairs)
+    return [
+        Finding(
+            kind=Kind.LOST,
+            case=case,
+            engine=engine,
+            mode=mode,
+            message=f"not in this run, and not good before: {', '.join(kinds)}",
+            since=min(each.since for each in state.open),
+            against=state.base,
+        )
+        for (case, engine, mode), state in found.items()
+        for kinds in (dict.fromkeys(each.kind for each in state.open),)
+    ]
+
+
 def _find_missing(
-    subject: Subject, store: Store | None, findings: Sequence[Finding]
+    subject: Subject, last: RunRow | None, findings: Sequence[Finding]
 ) -> Iterator[Finding]:
     """Yield the missing pairs of the last run of the same selection, whatever run is compared with:
     a case or an engine left out in silence. A run of another selection has another task.
     """
-    earlier = (
-        row
-        for row in (store.runs() if store else ())
-        if row.status != "running" and row.id < subject.before and same_task(row.key, subject.facts)
-    )
-    last = next(earlier, None)
     if last is None:
         return
-    known = subject.pairs | {each.pair for each in findings if each.kind is Kind.ABSENT}
+    known = subject.pairs | {
+        each.pair for each in findings if each.kind in (Kind.ABSENT, Kind.LOST)
+    }
     why = f"in run {last.id}, by the same command"
     present = present_names(subject.facts)
     for name, engine, mode in last.plan:
@@ -487,8 +509,8 @@ def _slower_on_machine(
         return
     in_loops = [time.seconds / time.loop for time in good if time.loop]
     usual = statistics.median(time.seconds for time in good)
-    # the spread of so few times is unknown
-    limit = limit if len(good) >= ENOUGH else limit**2
+    # the spread of so few times is unknown; what was slower must be seen to be good again
+    limit = limit if open_since or len(good) >= ENOUGH else limit**2
     yield from _slower(
         now, usual, statistics.median(in_loops) if in_loops else None, subject, limit
     )

@@ -6,15 +6,17 @@ from collections.abc import Sequence
 from contextlib import suppress
 from getpass import getuser
 
+from msgspec.structs import replace
+
 from ..errors import KincheckError, unknown
 from ..harness.provenance import readable
 from ..harness.record import Facts, Results
 from .comparison import compare, time_limit
 from .findings import Accepted, Finding
-from .queries import NOTHING
-from .states import State, accepted_in, next_state, put_state
+from .queries import NOTHING, last_alike
+from .states import State, accepted_in, next_state, put_state, vanished
 from .steps import with_crept
-from .store import HistoryError, Pair, Store, alive, now
+from .store import HistoryError, Pair, RunRow, Store, alive, now
 from .subjects import Subject, last_good, with_states
 
 CAUGHT_UP = 120
@@ -55,11 +57,12 @@ def judge_runs(store: Store) -> None:
         unjudged = _unjudged(store)
         for run in unjudged[:-CAUGHT_UP]:
             put_state(store, NO_PAIR, State(run=run, begun=run, base=None), {})
+    rows = store.runs()
     for run in unjudged[-CAUGHT_UP:]:
         facts, found = {}, dict[Pair, State]()
         with store.sparing():
             facts = store.run(run).circumstances
-            found = _judge(store, run, facts)
+            found = _judge(store, rows, run, facts)
         with store.transaction():
             for pair, state in (found or {NO_PAIR: State(run=run, begun=run, base=None)}).items():
                 put_state(store, pair, state, facts)
@@ -77,8 +80,12 @@ def _unjudged(store: Store) -> list[int]:
     return [run for run, status, owner in rows if status != "running" or not alive(owner)]
 
 
-def _judge(store: Store, run: int, facts: Facts) -> dict[Pair, State]:
-    """Return the states of a run's pairs after it."""
+def _judge(store: Store, rows: Sequence[RunRow], run: int, facts: Facts) -> dict[Pair, State]:
+    """Return the states of a run's pairs after it, and of those that were worse and are not in it.
+
+    Args:
+        rows: all runs, the latest first.
+    """
     records = store.records(run)
     subject = with_states(Subject("", run, Results(run={**facts}, records=records), run), store)
     base = last_good(subject, store)
@@ -88,7 +95,7 @@ def _judge(store: Store, run: int, facts: Facts) -> dict[Pair, State]:
         if finding.kind.regression:
             worse.setdefault(finding.pair, []).append(finding)
     accepted = accepted_in(store, run)
-    return {
+    states = {
         record.pair: next_state(
             record,
             run,
@@ -98,6 +105,11 @@ def _judge(store: Store, run: int, facts: Facts) -> dict[Pair, State]:
         )
         for record in records
     }
+    last = last_alike(rows, run, facts)
+    for pair, state in vanished(store, last, facts, {*states}).items():
+        still = () if pair in accepted else state.open
+        states[pair] = replace(state, run=run, open=still)
+    return states
 
 
 def accept(store: Store, names: Sequence[str], reason: str) -> list[Accepted]:

@@ -32,6 +32,16 @@ def same_task(a: Facts, b: Facts) -> bool:
     return a.get("command") == b.get("command")
 
 
+def last_alike(rows: Iterable[RunRow], before: float, facts: Facts) -> RunRow | None:
+    """Return the last ended run of the same selection before a run; None without one.
+
+    Args:
+        rows: the latest first.
+    """
+    ended = (row for row in rows if row.status != "running" and row.id < before)
+    return next((row for row in ended if same_task(row.key, facts)), None)
+
+
 def _of_its_files(later: Facts, earlier: Facts) -> bool:
     """Return whether a run was asked for all case files of an earlier one, as far as both tell:
     another file may have a case of the same name.
@@ -219,8 +229,8 @@ def entries_of(store: Store, run: int) -> list[tuple[Pair, Entry]]:
 
 
 def faultless(store: Store, rows: Sequence[RunRow]) -> set[int]:
-    """Return the numbers of the green ones of the latest runs, complete and with at least one pass
-    and no fault, by their outcomes alone: their records are not read.
+    """Return the numbers of the green ones of the latest runs: complete, with at least one pass, no
+    fault and no pair that is worse than its baseline. Their records are not read.
 
     Raises:
         HistoryError: the file cannot be read.
@@ -233,6 +243,9 @@ def faultless(store: Store, rows: Sequence[RunRow]) -> set[int]:
     with store.explained("read"):
         first = min((row.id for row in rows), default=0)
         good: dict[int, int] = dict(store.connection.execute(query, (first,)).fetchall())
+        worse = "SELECT DISTINCT run_id FROM states WHERE run_id >= ? AND open != '[]'"
+        for (run,) in store.connection.execute(worse, (first,)):
+            good.pop(run, None)
     # a finished run lacks the pairs of unreadable cases: its status was 2
     return {
         row.id for row in rows if row.status == "finished" and good.get(row.id) == len(row.plan)

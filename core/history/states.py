@@ -10,7 +10,7 @@ with the states of its `formerly` names.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import Any
 
 import msgspec
@@ -25,8 +25,8 @@ from ..harness.record import (
     update_outcome,
 )
 from .findings import Accepted, Finding, Kind
-from .queries import calibration, former_names
-from .store import Pair, Store
+from .queries import calibration, former_names, present_names
+from .store import Pair, RunRow, Store
 
 RECENT = 20
 """Number of latest runs that give the spread of times on the machine."""
@@ -148,6 +148,39 @@ def state_before(store: Store, pair: Pair, run: float, facts: Facts) -> State | 
             levels=msgspec.json.decode(levels, type=Levels),
             times=tuple(reversed(times)),
         )
+
+
+def vanished(
+    store: Store, last: RunRow | None, facts: Facts, pairs: Set[Pair]
+) -> dict[Pair, State]:
+    """Return the states of pairs that are worse in a run and not in a later one: they are worse
+    until they are good again or accepted.
+
+    Args:
+        last: the last run of the same selection.
+        facts, pairs: circumstances and pairs of the later run.
+
+    Raises:
+        HistoryError: the file cannot be read.
+    """
+    present = present_names(facts)
+    query = (
+        "SELECT case_name, engine, mode, begun, base_run, open, levels FROM states WHERE run_id = ?"
+        " AND open != '[]'"
+    )
+    found: dict[Pair, State] = {}
+    with store.explained("read"):
+        rows = store.connection.execute(query, (last.id,)).fetchall() if last else ()
+        for name, engine, mode, begun, base, worse, levels in rows:
+            if (present.get(name, name), engine, mode) not in pairs:
+                found[name, engine, mode] = State(
+                    run=last.id if last else 0,
+                    begun=begun,
+                    base=base,
+                    open=msgspec.json.decode(worse, type=tuple[Open, ...]),
+                    levels=msgspec.json.decode(levels, type=Levels),
+                )
+    return found
 
 
 def base_record(store: Store, run: int, pair: Pair, facts: Facts) -> Record | None:

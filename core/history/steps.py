@@ -294,18 +294,21 @@ def _outcomes(history: History, pair: Pair, entries: Sequence[Entry]) -> Iterato
 
 
 def _times(history: History, pair: Pair, entries: Sequence[Entry]) -> Iterator[Step]:
-    """Yield the changes of the time, in calibration loops, over the runs with a calibration."""
+    """Yield the changes of the time, in calibration loops, over the runs with a calibration on each
+    machine.
+    """
     loops = {run: calibration(row.circumstances) for run, row in history.runs.items()}
-    series = [
-        (entry, math.log(entry.seconds / loop))
-        for entry in entries
-        if entry.seconds and (loop := loops[entry.run])
-    ]
-    for level in _levels(series, math.log(PACE), LASTING):
-        loop = loops[level.first.run] or 1.0
-        before, now = math.exp(level.before) * loop, math.exp(level.now) * loop
-        if abs(now - before) > TIME_FLOOR:
-            yield _new_level(history, pair, level, before, now, quantity=TIME)
+    by_machine: dict[Any, list[tuple[Entry, float]]] = {}
+    for entry in entries:
+        if entry.seconds and (loop := loops[entry.run]):
+            machine = history.runs[entry.run].circumstances.get("processor")
+            by_machine.setdefault(machine, []).append((entry, math.log(entry.seconds / loop)))
+    for series in by_machine.values():
+        for level in _levels(series, math.log(PACE), LASTING):
+            loop = loops[level.first.run] or 1.0
+            before, now = math.exp(level.before) * loop, math.exp(level.now) * loop
+            if abs(now - before) > TIME_FLOOR:
+                yield _new_level(history, pair, level, before, now, quantity=TIME)
 
 
 def _errors(history: History, pair: Pair, entries: Sequence[Entry], motion: str) -> list[Step]:

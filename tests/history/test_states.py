@@ -210,3 +210,59 @@ def test_case_file_keeps_former_names(tmp_path):
     case = load_case(file)
     assert case.formerly == ("door", "flap")
     assert case_facts(case)["formerly"] == ["door", "flap"]
+
+
+def without_first(found):
+    return [each for each in found if each.pair[:2] != FIRST]
+
+
+def gone_since(path):
+    """Kind and first run of what is worse."""
+    return [(each.kind, each.pair[:2], each.since) for each in reported(path).regressions]
+
+
+def test_vanished_failure_stays_red(path, capsys):
+    nights(path, 2)
+    keep_changed(path, outcome=Outcome.FAIL, message="x is off")
+    for _ in range(3):
+        keep(path, without_first(records()))
+        assert gone_since(path) == [(Kind.LOST, FIRST, 3)]
+    assert report(path) == 1
+    keep_changed(path, outcome=Outcome.FAIL, message="x is off")
+    assert gone_since(path) == [(Kind.FAILURE, FIRST, 3)]
+    keep(path, without_first(records()))
+    keep(path, records())
+    assert report(path) == 0
+
+
+def test_vanished_failure_is_accepted(path, capsys):
+    nights(path, 2)
+    keep_changed(path, outcome=Outcome.FAIL, message="x is off")
+    keep(path, without_first(records()))
+    assert history(path, "--accept", "first:mujoco", "--reason", "no such case any more") == 0
+    for _ in range(2):
+        assert gone_since(path) == []
+        keep(path, without_first(records()))
+    keep_changed(path, **worse(30.0))  # its baseline is still its last good run
+    assert gone_since(path) == [(Kind.DRIFTED, FIRST, 7)]
+
+
+def test_killed_run_forgets_no_failure(path):
+    nights(path, 2)
+    keep_changed(path, outcome=Outcome.FAIL, message="x is off")
+    keep(path, without_first(records()), status="interrupted")
+    keep(path, without_first(records()))
+    assert gone_since(path) == [(Kind.LOST, FIRST, 3)]
+
+
+def test_drift_is_hidden_by_no_selection(path):
+    """All of its results pass, and another selection is run after it."""
+    other = {"command": "kincheck run second"}
+    second = [each for each in records() if each.case == "second"]
+    for _ in range(2):
+        keep(path, records())
+        keep(path, second, **other)
+    run = keep_changed(path, **worse(30000.0))
+    keep(path, second, **other)
+    found = reported(path)
+    assert (found.run.number, found.regressed) == (run, True)
