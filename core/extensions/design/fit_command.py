@@ -14,12 +14,12 @@ from ...errors import refuse
 from ...options import destination, group, json_file, option, options
 from .new_table import require_new, table_of, write_new
 
+DRAWING = "+- 2 mm"
+
 if TYPE_CHECKING:
     from ...case.case import Case
     from ...trajectory import Array
     from .fit import Fitted, Shift
-
-DRAWING = "+- 2 mm"
 
 
 @options

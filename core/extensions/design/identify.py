@@ -11,10 +11,9 @@ from ...case.case import Case
 from ...trajectory import Array
 from .likely import Estimate
 
-NULL, NAMED = 1e-15, 1e-13
-"""A combination with this part of the largest effect has none, by the round-off of exact slopes. Of
-all combinations some have little more; of those that can be named none has.
-"""
+NAMED = 100.0
+"""Moves that can be named may have so many times the effect of round-off: no others have little
+more than none."""
 # Directions of size one are another, if so much is left beside those known.
 _OWN = 1e-3
 MOST_TERMS, LEAST_TERM = 4, 0.1
@@ -77,12 +76,15 @@ def combinations(estimate: Estimate, boxes: Mapping[str, float]) -> list[Combina
     return found
 
 
-def without_effect(slopes: Array, case: Case, moves: Mapping[str, float], box: Array) -> list[str]:
+def without_effect(
+    slopes: Array, null: float, case: Case, moves: Mapping[str, float], box: Array
+) -> list[str]:
     """Return names of combinations of moves without effect, as many as there are: places, points
     that slide along the line to another one, all points together, and else their terms.
 
     Args:
         slopes: by the moves over their boxes, rows of size one.
+        null: part of the largest effect that is round-off.
         moves: by place [m].
     """
     largest = np.linalg.norm(slopes, 2)
@@ -91,13 +93,13 @@ def without_effect(slopes: Array, case: Case, moves: Mapping[str, float], box: A
         u = direction / box
         u /= np.linalg.norm(u)
         own = u - known.T @ (known @ u)
-        if np.linalg.norm(own) > _OWN and np.linalg.norm(slopes @ u) <= NAMED * largest:
+        if np.linalg.norm(own) > _OWN and np.linalg.norm(slopes @ u) <= NAMED * null * largest:
             names.append(name)
             known = np.vstack([known, own / np.linalg.norm(own)])
     others = np.linalg.svd(known)[2][len(known) :] if len(known) else np.eye(len(box))
     _, sizes, rows = np.linalg.svd(slopes @ others.T)
     sizes = np.append(sizes, np.zeros(len(rows) - len(sizes)))
-    for row in rows[sizes <= NULL * largest] @ others:
+    for row in rows[sizes <= null * largest] @ others:
         terms = row * box
         places = zip(moves, (terms / terms[np.abs(terms).argmax()]).tolist(), strict=True)
         names.append(Combination(dict(places), 0.0, 0.0, 0.0).words)
