@@ -8,4 +8,5 @@ EXTENSION = Extension(
     __name__,
     needs=["compare", "hardpoints", "sweep"],
     commands={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},
+    public={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},
 )

@@ -110,7 +110,7 @@ class Prediction:
         return source(float(np.nansum(self.spread)), float(np.nansum(self.drawing)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fitted:
     """The answer.
 
@@ -139,6 +139,9 @@ class Fitted:
     null: Sequence[str]
     idle: Sequence[str]
     predictions: Mapping[str, Prediction]
+
+    def __repr__(self) -> str:
+        return f"<Fitted: {self.rig.case.name} by {self.rig.file.name}, {self.verdict}>"
 
     @property
     def verdict(self) -> Verdict:

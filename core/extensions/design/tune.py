@@ -70,7 +70,7 @@ class Band:
         return self.goal.tolerance / self.goal.unit[1]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tuned:
     """The answer.
 
@@ -98,6 +98,10 @@ class Tuned:
     points: Sequence[tuple[float, float, float]]
     comparison: Report | None
     length: Unit
+
+    def __repr__(self) -> str:
+        how = "reached" if self.reached else "not reached"
+        return f"<Tuned: {self.case.name}, {how}, norm {self.move.norm:.6g}>"
 
     @property
     def reached(self) -> bool:

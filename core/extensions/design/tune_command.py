@@ -52,18 +52,27 @@ class Tune(OfCase):
     out: Path | None = destination("write the new table, as CSV", Path)
     json: str | None = json_file("the answer")
 
+    def answer(self, registry: Registry) -> Tuned:
+        """Find the least change of a table of hardpoints that brings outputs into bands.
+
+        Raises:
+            KincheckError: a goal or move makes no sense, the table does not reach its travel, or
+                another engine contradicts the answer.
+        """
+        from .tune import tune
+
+        case, file = table_of(self, registry)
+        return tune(case, file, self.supplied, (self.goal, self.move), self.starts, registry)
+
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ...report.sections import print_report
         from ...report.terminal import with_json
         from ..hardpoints.saving import write_table
-        from .tune import tune
 
         require_new(self.out)
         refuse(self.unwritable())
-        case, file = table_of(self, registry)
-        wanted = self.goal, self.move
-        found = tune(case, file, self.supplied, wanted, self.starts, registry)
+        found = self.answer(registry)
         if found.reached and self.out is not None:
             write_table(found.table, self.supplied, found.points, self.out, f"--out {self.out}")
         with with_json(_facts(found, self.out), self.json) as console:
