@@ -259,10 +259,13 @@ def fit_rig(
 
 def _boxes(case: Case, drawing: str, moves: Sequence[str]) -> dict[str, float]:
     usual = read_box(drawing, f"--drawing {drawing!r}", case)
-    if moves:
-        return read_moves(moves, case, drawing)
     rows = [each.name for each in case.hardpoints if each.moves]
-    return {f"{row} {axis}": usual for row in rows for axis in "xyz"}
+    every = {f"{row} {axis}": usual for row in rows for axis in "xyz"}
+    found = read_moves(moves, case, drawing) if moves else every
+    for place, box in found.items():
+        if -box.low != box.high:
+            raise KincheckError(f"move {place}: a deviation is the same both ways; say +- 2 mm")
+    return {place: box.size for place, box in found.items()}
 
 
 def _estimate(model: RigModel, free: Sequence[Shift]) -> Estimate:

@@ -20,7 +20,7 @@ from ..hardpoints.options import WheelOptions
 from ..hardpoints.reader import read_hardpoints
 from ..hardpoints.table import HardpointTable, unit_of
 from ..sweep.curves import curves
-from .goals import Goal, read_goals, read_moves
+from .goals import Box, Goal, read_goals, read_moves
 from .least_move import HELD, LeastMove, least_move
 from .new_table import case_of_points, check, moved_points
 
@@ -75,7 +75,7 @@ class Tuned:
     """The answer.
 
     Attributes:
-        moves, boxes: by place [m], along the axes of the table.
+        moves, boxes: by place, moves in m, along the axes of the table.
         rounds: of linearisation, over all starts; designs: that were solved.
         ends: the norm that each start ends with, None where it does not reach the target.
         checked: the engine that solved the answer again; None without one.
@@ -87,7 +87,7 @@ class Tuned:
     case: Case
     move: LeastMove
     moves: Mapping[str, float]
-    boxes: Mapping[str, float]
+    boxes: Mapping[str, Box]
     bands: Sequence[Band]
     rounds: int
     designs: int
@@ -186,14 +186,16 @@ def tune(
     of_goals, of_moves = wanted
     case, goals, notes = read_goals(of_goals, case, supplied)
     boxes = read_moves(of_moves, case)
-    search = Search(case, goals, boxes)
+    search = Search(case, goals, {place: each.size for place, each in boxes.items()})
+    low = np.array([each.low for each in boxes.values()]) / search.box
+    high = np.array([each.high for each in boxes.values()]) / search.box
     before = search.values(np.zeros(len(boxes)))
     random = np.random.default_rng(0)  # the same answer each time
-    others = random.uniform(-1.0, 1.0, (starts - 1, len(boxes)))
+    others = random.uniform(low, high, (starts - 1, len(boxes)))
     found = [
         end
         for start in (np.zeros(len(boxes)), *others)
-        if (end := least_move(search, start)) is not None
+        if (end := least_move(search, start, low, high)) is not None
     ]
     best = min(found, key=lambda each: each.order)
 

@@ -36,8 +36,8 @@ class Tune(OfCase):
         required=True,
     )
     move: tuple[str, ...] = option(
-        'points that may move, their axes in the table and their box: "tierod_inner: y z +- 15 mm";'
-        " may be repeated",
+        'points that may move, their axes in the table and their box: "tierod_inner: y z +- 15 mm",'
+        ' "uca_outer: z +5 -10 mm"; may be repeated',
         metavar="MOVE",
         several="repeated",
         required=True,
@@ -93,7 +93,7 @@ def _facts(found: Tuned, out: Path | None) -> dict[str, Any]:
         "search": "local",
         "norm": found.move.norm,
         "moves_m": found.moves,
-        "boxes_m": found.boxes,
+        "boxes_m": {name: [each.low, each.high] for name, each in found.boxes.items()},
         "bands": [
             {
                 "goal": each.goal.text,
@@ -145,10 +145,11 @@ def _lines(found: Tuned) -> list[str]:
         lines.append(line)
     for name, move in found.moves.items():
         box = found.boxes[name]
-        at_end = ", the end of its box" if abs(move) >= box * (1.0 - 1e-6) else ""
+        gap = min(box.high - move, move - box.low)
+        at_end = ", the end of its box" if gap <= 1e-6 * box.size else ""
         unit = found.length
         lines.append(
             f"  {name}: {move / unit.size:+.4f} {unit.name},"
-            f" box +- {number(box / unit.size)}{at_end}"
+            f" box {number(box.low / unit.size)} to {number(box.high / unit.size)}{at_end}"
         )
     return lines
