@@ -1,5 +1,5 @@
-"""The table that a rig measured: its most likely points, what the rig determines of them, and the
-slips of its file that fit as well.
+"""The table behind the curves of a rig: its most likely points, their intervals, and slips of the
+file with as good a fit.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Shift:
 
 @dataclass(frozen=True, eq=False)
 class Slip:
-    """A slip of the rig's file that fits.
+    """A slip of the rig's file with a fit.
 
     Attributes:
         chance: probability of its misfit.
@@ -93,7 +93,7 @@ class Slip:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """An output that was not measured, at the samples [SI].
+    """An output without a column in the file, at the samples [SI].
 
     Attributes:
         values, spread: by rig and drawing, with their deviations; drawing: deviations by the
@@ -116,14 +116,14 @@ class Fitted:
 
     Attributes:
         boxes: the drawing's deviation of each place [m].
-        first: the estimate from the data as they are; estimate: that without the shifts found.
+        first: the estimate from the data as they are; estimate: without the shifts found.
         shifts: zeros and scales, as tested in the end; found: shifts without which the data do not
             fit, the clearest first.
         worst: the number farthest off, in words.
-        slips: that fit the data as they are.
+        slips: those with a fit.
         combinations: the best known first.
-        null: combinations without effect on what was measured, in words.
-        idle: places left out, since nothing measured follows them.
+        null: combinations without effect on the measured outputs, in words.
+        idle: places left out, without effect on the measured outputs.
         predictions: by output.
     """
 
@@ -152,7 +152,7 @@ class Fitted:
 
     @property
     def loose(self) -> list[Shift]:
-        """The scales that the rig does not tell."""
+        """The scales in doubt, since moved points do the same."""
         return [
             each
             for each in self.shifts
@@ -191,8 +191,8 @@ def fit(
     Args:
         file: of the rig.
         drawing: the drawing's deviation, as text.
-        moves: places that may be off, as texts; all by default.
-        free: names of the shifts that the rig may have.
+        moves: places in doubt, as texts; all by default.
+        free: names of the rig's possible shifts.
 
     Raises:
         KincheckError: the file or an option makes no sense, or the table does not reach the travel
@@ -209,7 +209,7 @@ def fit_rig(
 
     Args:
         boxes: deviation of each place by the drawing [m].
-        every: leave out places that nothing measured follows.
+        every: leave out places without effect on the measured outputs.
     """
     model, start = rig.model(boxes), np.zeros(len(boxes))
     rig = with_scatter(rig, model.values(start))
@@ -246,15 +246,16 @@ def fit_rig(
         estimate = _estimate(model, [*freed, *found])
     at = tests[len(offsets) :]
     worst = max(at, key=lambda each: abs(each.size / each.deviation))
-    slopes, round_off = model.over_travel(estimate.u)
-    fitted = Fitted(
-        *(rig, boxes, first, estimate, offsets),
-        [_alone(each, k, [*freed, *found], estimate) for k, each in enumerate(found, len(freed))],
-        *(worst.words, slips or [*_slips(model, estimate)], combinations(estimate, boxes)),
-        *([], idle if every else [], predictions(model, estimate)),
-    )
     box = np.array([*boxes.values()])
-    return replace(fitted, null=without_effect(slopes, round_off, rig.case, fitted.moves, box))
+    moves = dict(zip(boxes, (estimate.u * box).tolist(), strict=True))
+    every_shift = [*freed, *found]
+    return Fitted(
+        *(rig, boxes, first, estimate, offsets),
+        [_alone(each, k, every_shift, estimate) for k, each in enumerate(found, len(freed))],
+        *(worst.words, slips or [*_slips(model, estimate)], combinations(estimate, boxes)),
+        without_effect(*model.over_travel(estimate.u), rig.case, moves, box),
+        *(idle if every else (), predictions(model, estimate)),
+    )
 
 
 def _boxes(case: Case, drawing: str, moves: Sequence[str]) -> dict[str, float]:
@@ -324,8 +325,8 @@ def _named(names: Sequence[str], known: Sequence[Shift]) -> list[Shift]:
 
 
 def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
-    """Yield the slips of the rig's file that fit, the likeliest first; if the data fit, those that
-    fit as well.
+    """Yield the slips of the rig's file with a fit, the likeliest first; beside data
+    with a fit, those as good.
     """
     rig = model.rig
     box = model.boxes
@@ -375,7 +376,7 @@ def _linear_misfit(estimate: Estimate) -> float:
 
 
 def predictions(model: RigModel, estimate: Estimate) -> dict[str, Prediction]:
-    """Return the outputs that were not measured, by rig and drawing, by name."""
+    """Return the outputs without a column, by rig and drawing, by name."""
     told = dict[str, Prediction]()
     for name, values, slopes in model.predicted(estimate.u):
         spread = np.sqrt(np.einsum("si,ij,sj->s", slopes, estimate.covariance, slopes))

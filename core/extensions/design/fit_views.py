@@ -1,8 +1,8 @@
-"""The page of a fit: what was measured and what is left of it, combinations, predictions, moves."""
+"""The report of a fit: verdict, curves and residuals, combinations, predictions, moves."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,7 +42,7 @@ def headline(found: Fitted) -> str:
 
 
 def report(found: Fitted) -> Report:
-    """Return what the rig says: the verdict first, then what it determines, if anything fits."""
+    """Return the verdict, then combinations, predictions and coordinates, if anything fits."""
     rig, first = found.rig, found.first
     facts = [
         f"{rig.count} numbers of {', '.join(goal.output for goal in rig.goals)}",
@@ -106,16 +106,13 @@ def _curves(found: Fitted) -> list[Diagram]:
         order = np.argsort(values[goal.at], kind="stable")
         travel, unit = values[goal.at][order] / along.size, rig.unit(goal).size
 
-        def line(style: Style, values: Array, x: Array = travel) -> Figure:
-            return style.curve(_short(x), _short(values), size=6)
+        def line(style: Style, values: Array) -> Figure:
+            return style.curve(_short(travel), _short(values), size=6)
 
-        def of(values: Array, goal: Goal = goal, order: Array = order, unit: float = unit) -> Array:
-            return values[goal.at][order] / unit
-
+        every = [_of(goal, each)[order] / unit for each in (drawn, fitted)]
         measured = goal.middle[order] / unit
         curves = [
-            line(_DRAWING, of(drawn[goal.output])),
-            line(_FIT, of(fitted[goal.output])),
+            *(line(style, each) for style, each in zip((_DRAWING, _FIT), every, strict=True)),
             line(_RIG, measured) | {"mode": "markers"},
         ]
         half = NORMAL * noise[order] / unit
@@ -131,7 +128,7 @@ def _curves(found: Fitted) -> list[Diagram]:
             "uid": _RIG.key,
             "name": "noise of the rig",
         }
-        rest = line(_RIG, measured - of(fitted[goal.output])) | {"mode": "markers"}
+        rest = line(_RIG, measured - every[1]) | {"mode": "markers"}
         for what, data in (("", curves), (" less the fitted table", [band, rest])):
             title = with_unit(goal.output + what, rig.unit(goal).name)
             layout: Figure = {
@@ -142,6 +139,10 @@ def _curves(found: Fitted) -> list[Diagram]:
             plot = Plot(f"curve-{len(diagrams)}", title, "Band: noise of the rig." if what else "")
             diagrams.append(Diagram(plot, {"data": data, "layout": layout}, [_RIG, _FIT, _DRAWING]))
     return diagrams
+
+
+def _of(goal: Goal, values: Mapping[str, Array]) -> Array:
+    return values[goal.output][goal.at]
 
 
 def _combinations(found: Fitted) -> Section:

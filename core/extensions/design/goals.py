@@ -130,7 +130,7 @@ def read_goals(
 
 
 def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, Box]:
-    """Return the box of each place that may move.
+    """Return the box of each place to move.
 
     Args:
         usual: box of moves without one.
@@ -210,7 +210,7 @@ def _draft(text: str, case: Case) -> _Draft:
 
 
 def _unit(text: str, name: str, case: Case, output: str) -> Unit:
-    """Return a unit of an output by its name; without one, that of the table."""
+    """Return a unit of an output by its name; without one, the table's."""
     si = next(each.unit for each in case.outputs if each.name == output)
     expected, found = read_unit(si), read_unit(name or _of_table(si, case))
     if found is not None and expected is not None and found[1] == expected[1]:

@@ -1,4 +1,4 @@
-"""What measured curves determine: combinations of moves, and moves without any effect."""
+"""Combinations of moves by measured curves, and moves without any effect."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Combination:
 
     Attributes:
         terms: coefficients by place.
-        value, deviation, drawing: its size, its deviation, and that by the drawing [m].
+        value, deviation, drawing: its size, and its deviations by the rig and by the drawing [m].
     """
 
     terms: Mapping[str, float]
@@ -59,7 +59,7 @@ def source(deviation: float, drawing: float) -> str:
 
 
 def combinations(estimate: Estimate, boxes: Mapping[str, float]) -> list[Combination]:
-    """Return the combinations of moves that the numbers tell apart, the best known first."""
+    """Return the combinations of moves, the best known first."""
     found = list[Combination]()
     for size, row in zip(*estimate.decomposed, strict=True):
         terms = row / np.array([*boxes.values()])
@@ -80,11 +80,11 @@ def without_effect(
     slopes: Array, null: float, case: Case, moves: Mapping[str, float], box: Array
 ) -> list[str]:
     """Return names of combinations of moves without effect, as many as there are: places, points
-    that slide along the line to another one, all points together, and else their terms.
+    along the line to another one, all points together, and else their terms.
 
     Args:
         slopes: by the moves over their boxes, rows of size one.
-        null: part of the largest effect that is round-off.
+        null: round-off, over the largest effect.
         moves: by place [m].
     """
     largest = np.linalg.norm(slopes, 2)
@@ -107,7 +107,7 @@ def without_effect(
 
 
 def _candidates(case: Case, moves: Mapping[str, float]) -> Iterator[tuple[str, Array]]:
-    """Yield names and directions of moves [m] that may have no effect, the plainest first."""
+    """Yield names and directions of moves [m] with possibly no effect, the plainest first."""
     places = [*moves]
     for place in places:
         yield f"{place} alone", np.array([float(each == place) for each in places])

@@ -1,4 +1,4 @@
-"""The least move of a design that brings its outputs into bands.
+"""The least move of a design to bring its outputs into bands.
 
 With u the moves over their boxes, and g(u) the outputs over their bands, -1 to 1 within:
 
@@ -38,14 +38,14 @@ _WEIGHT = 1e3
 
 @dataclass(frozen=True, eq=False)
 class LeastMove:
-    """Where a search ends.
+    """The end of a search.
 
     Attributes:
         moves: over their boxes, shape (moves,).
         excess: by how much the worst number is beyond its band, over the half-width; not positive
             if all bands are held.
-        multipliers: what the norm falls by, if each band becomes wider by its half-width, shape
-            (numbers,); of bands that cannot be held, the share of each in that.
+        multipliers: by how much the norm falls, if each band becomes wider by its half-width, shape
+            (numbers,); of bands beyond reach, the share of each.
         rounds: of linearisation.
     """
 

@@ -40,7 +40,7 @@ STEP = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """What a rig measured.
+    """Curves of a rig as numbers.
 
     Attributes:
         file: of the numbers.
@@ -97,7 +97,7 @@ class Rig:
         return self.unit_of(goal.output)
 
     def unit_of(self, output: str) -> Unit:
-        """Return the unit of an output that was not measured."""
+        """Return the unit of an output by its name, as the table has it."""
         si = next(each.unit for each in self.case.outputs if each.name == output)
         return unit_in_table(si, self.case)
 
@@ -176,7 +176,7 @@ class RigModel:
         return np.concatenate(kept), NULL
 
     def predicted(self, u: Array) -> Iterator[tuple[str, Array, Array]]:
-        """Yield the outputs that were not measured: name, values, and slopes by the moves over
+        """Yield the outputs without a column: name, values, and slopes by the moves over
         their boxes.
         """
         case, names = self.rig.case, self.search.names
@@ -198,7 +198,7 @@ class RigModel:
 
 
 def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
-    """Return what a rig measured, with the noise of its digits or as it is stated.
+    """Return the numbers of a rig, with the noise of its digits or as it is stated.
 
     Raises:
         CaseError: the file cannot be read, or has no output of the case.
@@ -218,18 +218,18 @@ def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
         goals.append(Goal(*named, at, series.position[at], 1.0))
         noise.append(np.hypot(digits, stated))
         sources.append("as stated" if stated else "printed digits")
-    at = found.sweep.values
-    every = np.concatenate([found.sweep.change, case.sweep.change])
-    ends = np.linspace(LONG * every.min(), LONG * every.max(), LONGEST)
-    travels = [
-        *(at, np.concatenate([at + STEP, at - STEP]), 2.0 * found.sweep.design - at),
-        found.sweep.design + ends,
-    ]
-    cases = [
-        replace(found, sweep=replace(found.sweep, values=values), reference={})
-        for values in travels
-    ]
-    return Rig(file, *cases, goals, noise, sources, notes)
+    sweep, at = found.sweep, found.sweep.values
+    every = np.concatenate([sweep.change, case.sweep.change])
+    long: Array = np.linspace(LONG * every.min(), LONG * every.max(), LONGEST)
+
+    def over(values: Array) -> Case:
+        return replace(found, sweep=replace(sweep, values=values), reference={})
+
+    return Rig(
+        *(file, over(at), over(np.concatenate([at + STEP, at - STEP]))),
+        *(over(2.0 * sweep.design - at), over(sweep.design + long)),
+        *(goals, noise, sources, notes),
+    )
 
 
 def with_scatter(rig: Rig, drawn: Mapping[str, Array]) -> Rig:

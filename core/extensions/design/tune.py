@@ -31,14 +31,14 @@ SAME_NORM = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """A goal and what becomes of it [SI].
+    """A goal before and after [SI].
 
     Attributes:
         before, after: smallest and largest value at its samples.
         excess: beyond the band, over its half-width; not positive if it is held.
         tight: driver values at which it is tight.
         worst: driver value nearest to an edge, or farthest beyond.
-        multiplier: what the norm falls by, for each unit by which the band becomes wider.
+        multiplier: by how much the norm falls, for each unit by which the band becomes wider.
     """
 
     goal: Goal
@@ -76,9 +76,9 @@ class Tuned:
 
     Attributes:
         moves, boxes: by place, moves in m, along the axes of the table.
-        rounds: of linearisation, over all starts; designs: that were solved.
-        ends: the norm that each start ends with, None where it does not reach the target.
-        checked: the engine that solved the answer again; None without one.
+        rounds: of linearisation, over all starts; designs: number of those solved.
+        ends: the norm at the end of each start, None for one beyond the target.
+        checked: the engine of the check; None without one.
         table, points: the table as read, and its new points in its own units.
         comparison: old against new; None if the target is not reached.
         length: unit of the table.
@@ -172,7 +172,7 @@ def tune(
     starts: int,
     registry: Registry,
 ) -> Tuned:
-    """Return the least move that holds all bands, or the nearest miss.
+    """Return the least move to hold all bands, or the nearest miss.
 
     Args:
         file: the table of the case, read with `supplied`.

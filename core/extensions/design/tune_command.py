@@ -1,4 +1,4 @@
-"""kincheck tune: the least change of a table of hardpoints that reaches a target."""
+"""kincheck tune: the least change of a table of hardpoints to reach a target."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STARTS = 6
 
 @options
 class Tune(OfCase):
-    """Find the least change of a table of hardpoints that brings outputs into bands.
+    """Find the least change of a table of hardpoints to bring outputs into bands.
 
     The change is least in its norm: the root of the sum of squares of all moves over their boxes.
     The search is local, from several starts. Another engine solves the answer again before it is
@@ -53,7 +53,7 @@ class Tune(OfCase):
     json: str | None = json_file("the answer")
 
     def answer(self, registry: Registry) -> Tuned:
-        """Find the least change of a table of hardpoints that brings outputs into bands.
+        """Find the least change of a table of hardpoints to bring outputs into bands.
 
         Raises:
             KincheckError: a goal or move makes no sense, the table does not reach its travel, or

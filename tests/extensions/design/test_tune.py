@@ -170,7 +170,8 @@ def test_tune_box_ends_where_stated(car, capsys):
     status, found, _ = tune(car, GOALS[:1], f"tierod_inner: z +15 -{0.9e3 * -move:.6f} mm")
     assert status == 1
     assert "the end of its box" in capsys.readouterr().out
-    tuned = kincheck.tune(car, goal=GOALS[:1], move=["tierod_inner: z +5 -10 mm"], starts=1)
+    how = {"move": ["tierod_inner: z +5 -10 mm"], "supplied": kincheck.Supplied(travel="30mm:7")}
+    tuned = kincheck.tune(car, goal=GOALS[:1], starts=1, **how)
     assert tuned.moves["tierod_inner z"] == pytest.approx(move, abs=1e-9)
 
 
