@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import math
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -63,7 +64,7 @@ def write_table(
         KincheckError: the file exists, cannot be written, or would be read with other numbers.
     """
     alone = replace(supplied, sheet=None, corner=None)  # the new file has one table
-    tries = [*_texts_with_changes(table, points), _new_text(table, supplied, points)]
+    tries = [*_texts_with_changes(table, points), new_text(table, supplied, points)]
     for content, said in zip(tries, [*[supplied] * (len(tries) - 1), alone], strict=True):
         _write(path, content, option)
         if _reads_back(path, said, supplied, table, points):
@@ -108,6 +109,7 @@ def _reads_back(
             (
                 *(unit_of(each, given.units).size, axes_of(each, given.axes), each.side),
                 *(each.template or given.template, each.static_toe, each.static_camber),
+                each.wheel_radius,
             )
             for each, given in ((found, said), (table, supplied))
         ]
@@ -181,7 +183,7 @@ def _change(
     return True
 
 
-def _new_text(
+def new_text(
     table: HardpointTable, supplied: WheelOptions, points: Sequence[Sequence[float]]
 ) -> bytes:
     """Return a new table as CSV, with unit, axes, side and template."""
@@ -190,6 +192,9 @@ def _new_text(
         "units": unit_of(table, supplied.units).name,
         "axes": table.axes or supplied.axes,
         "side": table.side,
+        "wheel_radius": table.wheel_radius,
+        "static_toe": table.static_toe and f"{math.degrees(table.static_toe)!r} deg",
+        "static_camber": table.static_camber and f"{math.degrees(table.static_camber)!r} deg",
     }
     text = StringIO()
     text.write("".join(f"# {key}: {value}\n" for key, value in known.items() if value))
