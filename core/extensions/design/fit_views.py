@@ -106,14 +106,14 @@ def _curves(found: Fitted) -> list[Diagram]:
         order = np.argsort(values[goal.at], kind="stable")
         travel, unit = values[goal.at][order] / along.size, rig.unit(goal).size
 
-        def line(style: Style, values: Array) -> Figure:
-            return style.curve(_short(travel), _short(values), size=6)
-
         every = [_of(goal, each)[order] / unit for each in (drawn, fitted)]
         measured = goal.middle[order] / unit
         curves = [
-            *(line(style, each) for style, each in zip((_DRAWING, _FIT), every, strict=True)),
-            line(_RIG, measured) | {"mode": "markers"},
+            *(
+                _line(style, travel, each)
+                for style, each in zip((_DRAWING, _FIT), every, strict=True)
+            ),
+            _line(_RIG, travel, measured) | {"mode": "markers"},
         ]
         half = NORMAL * noise[order] / unit
         band: Figure = {
@@ -128,7 +128,7 @@ def _curves(found: Fitted) -> list[Diagram]:
             "uid": _RIG.key,
             "name": "noise of the rig",
         }
-        rest = line(_RIG, measured - every[1]) | {"mode": "markers"}
+        rest = _line(_RIG, travel, measured - every[1]) | {"mode": "markers"}
         for what, data in (("", curves), (" less the fitted table", [band, rest])):
             title = with_unit(goal.output + what, rig.unit(goal).name)
             layout: Figure = {
@@ -139,6 +139,10 @@ def _curves(found: Fitted) -> list[Diagram]:
             plot = Plot(f"curve-{len(diagrams)}", title, "Band: noise of the rig." if what else "")
             diagrams.append(Diagram(plot, {"data": data, "layout": layout}, [_RIG, _FIT, _DRAWING]))
     return diagrams
+
+
+def _line(style: Style, x: Array, y: Array) -> Figure:
+    return style.curve(_short(x), _short(y), size=6)
 
 
 def _of(goal: Goal, values: Mapping[str, Array]) -> Array:

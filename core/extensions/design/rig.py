@@ -220,7 +220,7 @@ def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
         sources.append("as stated" if stated else "printed digits")
     sweep, at = found.sweep, found.sweep.values
     every = np.concatenate([sweep.change, case.sweep.change])
-    long: Array = np.linspace(LONG * every.min(), LONG * every.max(), LONGEST)
+    long = np.linspace(LONG * float(every.min()), LONG * float(every.max()), LONGEST)
 
     def over(values: Array) -> Case:
         return replace(found, sweep=replace(sweep, values=values), reference={})
