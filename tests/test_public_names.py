@@ -40,8 +40,8 @@ def test_import_loads_names_only():
 
 
 BY_NAME = (
-    *("check_engine", "compare", "compliance", "curves", "curves_by_chunk", "explain", "free"),
-    *("live", "load", "primitives", "report", "run", "sweep"),
+    *("check_engine", "compare", "compliance", "curves", "curves_by_chunk", "explain", "fit"),
+    *("free", "live", "load", "primitives", "report", "run", "sweep", "tune"),
     *("Assemblies", "Assembly", "DesignCurves", "find_assemblies"),
 )
 VARY = """schema = "kincheck-vary/1"

@@ -1,5 +1,5 @@
-"""Designs from their curves: the least change of a table that reaches a target, and the table that
-a rig measured.
+"""Designs from their curves: the least change of a table to reach a target, and the table behind
+the curves of a rig.
 """
 
 from ...doors import Extension
@@ -8,4 +8,5 @@ EXTENSION = Extension(
     __name__,
     needs=["compare", "hardpoints", "sweep"],
     commands={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},
+    public={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},
 )

@@ -1,5 +1,5 @@
-"""The table that a rig measured: its most likely points, what the rig determines of them, and the
-slips of its file that fit as well.
+"""The table behind the curves of a rig: its most likely points, their intervals, and slips of the
+file with as good a fit.
 """
 
 from __future__ import annotations
@@ -13,18 +13,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ...case.case import PER_TRAVEL, TIME, Case, Output
+from ...case.case import Case
 from ...case.io.reader_options import CurveOptions
-from ...case.units import ANGLES, SECOND, Unit
+from ...case.units import ANGLES, Unit
 from ...errors import KincheckError, unknown
 from ...harness.suspects import FACTORS
 from ...report.axis import ZERO
 from ...trajectory import Array
-from ..sweep.curves import curves
-from .goals import read_box, read_moves, unit_in_table
+from .goals import read_box, read_moves
 from .identify import Combination, combinations, source, without_effect
 from .likely import Estimate, most_likely
-from .rig import Rig, RigModel, read_rig, with_scatter
+from .rig import ROUND_OFF, Rig, RigModel, read_rig, with_scatter
 
 ALPHA = 0.01
 """Data are off, if such ones have a smaller probability."""
@@ -33,8 +32,6 @@ NORMAL = 1.959963984540054
 LESS = 2.0 * log(1000.0)
 """Another unit is named, if its data are at most a thousand times less likely."""
 MOST_FOUND = 6
-ROUND_OFF = 1e-9
-"""Effects smaller than this part of the largest are none: real ones are a thousand times larger."""
 # A linear misfit this many times the mean will not end near it.
 _HOPELESS = 100.0
 _UNKNOWN_SCALE = 0.03  # a gauge may be so much off, and be trusted
@@ -82,7 +79,7 @@ class Shift:
 
 @dataclass(frozen=True, eq=False)
 class Slip:
-    """A slip of the rig's file that fits.
+    """A slip of the rig's file with a fit.
 
     Attributes:
         chance: probability of its misfit.
@@ -96,7 +93,7 @@ class Slip:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """An output that was not measured, at the samples [SI].
+    """An output without a column in the file, at the samples [SI].
 
     Attributes:
         values, spread: by rig and drawing, with their deviations; drawing: deviations by the
@@ -113,20 +110,20 @@ class Prediction:
         return source(float(np.nansum(self.spread)), float(np.nansum(self.drawing)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fitted:
     """The answer.
 
     Attributes:
         boxes: the drawing's deviation of each place [m].
-        first: the estimate from the data as they are; estimate: that without the shifts found.
+        first: the estimate from the data as they are; estimate: without the shifts found.
         shifts: zeros and scales, as tested in the end; found: shifts without which the data do not
             fit, the clearest first.
         worst: the number farthest off, in words.
-        slips: that fit the data as they are.
+        slips: those with a fit.
         combinations: the best known first.
-        null: combinations without effect on what was measured, in words.
-        idle: places left out, since nothing measured follows them.
+        null: combinations without effect on the measured outputs, in words.
+        idle: places left out, without effect on the measured outputs.
         predictions: by output.
     """
 
@@ -143,6 +140,9 @@ class Fitted:
     idle: Sequence[str]
     predictions: Mapping[str, Prediction]
 
+    def __repr__(self) -> str:
+        return f"<Fitted: {self.rig.case.name} by {self.rig.file.name}, {self.verdict}>"
+
     @property
     def verdict(self) -> Verdict:
         """Whether data and model agree, and whether slips do too."""
@@ -152,33 +152,18 @@ class Fitted:
 
     @property
     def loose(self) -> list[Shift]:
-        """The scales that the rig does not tell."""
+        """The scales in doubt, since moved points do the same."""
         return [
             each
             for each in self.shifts
             if each.unit.name == "%" and NORMAL * each.deviation > _UNKNOWN_SCALE
         ]
 
-    @property
-    def length(self) -> Unit:
-        """The unit of the table."""
-        return unit_in_table("m", self.rig.case)
-
-    @property
-    def along(self) -> Unit:
-        """The unit of the travel."""
-        return travel_unit(self.rig)
-
     def told_at(self, prediction: Prediction) -> int:
         """Return the sample to tell of: the one nearest to design, unless all is known there."""
         drawn = np.nan_to_num(prediction.drawing)
-        order = np.argsort(np.abs(self.rig.case.sweep.change), kind="stable")
+        order = np.argsort(np.abs(self.rig.travel(self.rig.goals[0])[1]), kind="stable")
         return next(int(k) for k in order if drawn[k] > 0.01 * drawn.max())
-
-    def unit_of(self, output: str) -> Unit:
-        """Return the unit of an output as the table has it."""
-        units = {each.name: each.unit for each in self.rig.case.outputs}
-        return unit_in_table(units[output], self.rig.case)
 
     @property
     def moves(self) -> dict[str, float]:
@@ -206,8 +191,8 @@ def fit(
     Args:
         file: of the rig.
         drawing: the drawing's deviation, as text.
-        moves: places that may be off, as texts; all by default.
-        free: names of the shifts that the rig may have.
+        moves: places in doubt, as texts; all by default.
+        free: names of the rig's possible shifts.
 
     Raises:
         KincheckError: the file or an option makes no sense, or the table does not reach the travel
@@ -224,11 +209,10 @@ def fit_rig(
 
     Args:
         boxes: deviation of each place by the drawing [m].
-        every: leave out places that nothing measured follows.
+        every: leave out places without effect on the measured outputs.
     """
     model, start = rig.model(boxes), np.zeros(len(boxes))
-    remedy = "leave out the rows of the rig beyond it, or correct the table"
-    rig = with_scatter(rig, model.search.values(start, remedy))
+    rig = with_scatter(rig, model.values(start))
     model = rig.model(boxes)
     given = model(start)
     if given is None:
@@ -262,28 +246,32 @@ def fit_rig(
         estimate = _estimate(model, [*freed, *found])
     at = tests[len(offsets) :]
     worst = max(at, key=lambda each: abs(each.size / each.deviation))
-    slopes = _over_travel(model, estimate.u)
-    fitted = Fitted(
-        *(rig, boxes, first, estimate, offsets),
-        [_alone(each, k, [*freed, *found], estimate) for k, each in enumerate(found, len(freed))],
-        *(worst.words, slips or [*_slips(model, estimate)], combinations(estimate, boxes)),
-        *([], idle if every else [], predictions(model, estimate)),
-    )
     box = np.array([*boxes.values()])
-    return replace(fitted, null=without_effect(slopes, rig.case, fitted.moves, box))
+    moves = dict(zip(boxes, (estimate.u * box).tolist(), strict=True))
+    every_shift = [*freed, *found]
+    return Fitted(
+        *(rig, boxes, first, estimate, offsets),
+        [_alone(each, k, every_shift, estimate) for k, each in enumerate(found, len(freed))],
+        *(worst.words, slips or [*_slips(model, estimate)], combinations(estimate, boxes)),
+        without_effect(*model.over_travel(estimate.u), rig.case, moves, box),
+        *(idle if every else (), predictions(model, estimate)),
+    )
 
 
 def _boxes(case: Case, drawing: str, moves: Sequence[str]) -> dict[str, float]:
     usual = read_box(drawing, f"--drawing {drawing!r}", case)
-    if moves:
-        return read_moves(moves, case, drawing)
     rows = [each.name for each in case.hardpoints if each.moves]
-    return {f"{row} {axis}": usual for row in rows for axis in "xyz"}
+    every = {f"{row} {axis}": usual for row in rows for axis in "xyz"}
+    found = read_moves(moves, case, drawing) if moves else every
+    for place, box in found.items():
+        if -box.low != box.high:
+            raise KincheckError(f"move {place}: a deviation is the same both ways; say +- 2 mm")
+    return {place: box.size for place, box in found.items()}
 
 
 def _estimate(model: RigModel, free: Sequence[Shift]) -> Estimate:
     columns = np.array([each.direction for each in free]).reshape(-1, model.rig.count).T
-    found = most_likely(model, np.zeros(len(model.search.boxes)), columns)
+    found = most_likely(model, np.zeros(len(model.boxes)), columns)
     assert found is not None  # the drawing reaches all samples
     return found
 
@@ -291,38 +279,28 @@ def _estimate(model: RigModel, free: Sequence[Shift]) -> Estimate:
 def _offsets(model: RigModel, estimate: Estimate) -> Iterator[Shift]:
     """Yield zeros and scales of outputs and travel, of any size."""
     rig, percent = model.rig, Unit("%", 0.01, float)
-    values = rig.of(model.search.values(estimate.u))
+    values = rig.of(model.values(estimate.u))
     for goal in rig.goals:
         rows = rig.rows(goal) * rig.weights
         yield Shift(f"{goal.output} zero", rows, 0.0, np.inf, rig.unit(goal), 1.0)
         if (rows * values).any():
             yield Shift(f"{goal.output} scale", rows * values, 0.0, np.inf, percent, 1.0)
-    sweep = rig.case.sweep
-    slopes = model.by_travel(estimate.u) if sweep.driver != TIME else np.array(np.nan)
-    if np.isfinite(slopes).all():
+    if (slopes := model.by_travel(estimate.u)) is not None:
         along = -slopes * rig.weights
-        travel = np.array([sweep.change[k] for _, k in rig.places])
-        yield Shift("travel zero", along, 0.0, np.inf, travel_unit(rig), 1.0)
+        travel = np.array([rig.case.sweep.change[k] for _, k in rig.places])
+        yield Shift("travel zero", along, 0.0, np.inf, rig.travel(rig.goals[0])[2], 1.0)
         yield Shift("travel scale", along * travel, 0.0, np.inf, percent, 1.0)
 
 
 def _samples(rig: Rig) -> Iterator[Shift]:
     """Yield each number as a shift of its own."""
-    along = travel_unit(rig)
     for k, (goal, at) in enumerate(rig.places):
-        where = rig.case.sweep.values[at] / along.size
+        _, values, unit = rig.travel(goal)
+        where = f"{values[at] / unit.size:.4g} {unit.name}"
         direction = np.zeros(rig.count)
         direction[k] = rig.weights[k]
-        name = f"{goal.output} at {where:.4g} {along.name}"
+        name = f"{goal.output} at {where}"
         yield Shift(name, direction, 0.0, np.inf, rig.unit(goal), 1.0)
-
-
-def travel_unit(rig: Rig) -> Unit:
-    """Return the unit of the travel as the table has it."""
-    driver = rig.case.sweep.driver
-    if driver == TIME:
-        return SECOND
-    return unit_in_table("rad" if rig.case.mechanism.driver(driver).turns else "m", rig.case)
 
 
 def _sized(shift: Shift, estimate: Estimate) -> Shift:
@@ -347,11 +325,11 @@ def _named(names: Sequence[str], known: Sequence[Shift]) -> list[Shift]:
 
 
 def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
-    """Yield the slips of the rig's file that fit, the likeliest first; if the data fit, those that
-    fit as well.
+    """Yield the slips of the rig's file with a fit, the likeliest first; beside data
+    with a fit, those as good.
     """
     rig = model.rig
-    box = model.search.boxes
+    box = model.boxes
     slips = dict[str, Rig]()
     for goal in rig.goals:
         slips[f"{goal.output} negated"] = rig.times({goal.output: -1.0})
@@ -365,7 +343,7 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
             middle = {one.output: other.middle, other.output: one.middle}
             goals = [replace(g, middle=middle.get(g.output, g.middle)) for g in rig.goals]
             slips[f"{one.output} and {other.output} exchanged"] = replace(rig, goals=goals)
-    if rig.case.sweep.driver != TIME:
+    if rig.back is not rig.case:
         slips["travel negated"] = replace(rig, case=rig.back)
     fits = list[tuple[float, Slip]]()
     for name, slipped in slips.items():
@@ -397,42 +375,12 @@ def _linear_misfit(estimate: Estimate) -> float:
     return float(left @ left)
 
 
-def _over_travel(model: RigModel, u: Array) -> Array:
-    """Return slopes of what was measured over a long travel as far as it is reached, each row of
-    size one: what has no effect over a part of the travel has none anywhere, and a longer part
-    tells it better from a small effect.
-    """
-    rig, search = model.rig, model.search
-    names, places = search.names, search.places
-    found = curves(rig.long, places, (u * search.box)[None], names, names)
-    kept = list[Array]()
-    for name in names:
-        rows = found.slopes[name][0] * search.box
-        size = np.linalg.norm(rows, axis=1)
-        known = size > ROUND_OFF * np.nanmax(size)  # at design some are zero
-        kept.append(rows[known] / size[known, None])
-    return np.concatenate(kept)
-
-
 def predictions(model: RigModel, estimate: Estimate) -> dict[str, Prediction]:
-    """Return what rig and drawing say of the outputs that were not measured, by name."""
-    search, case = model.search, model.search.case
-    names = [
-        each.name
-        for each in case.outputs
-        if not (each.forces or isinstance(each, Output))
-        and PER_TRAVEL not in each.name
-        and each.name not in search.names
-    ]
-    if not names:
-        return {}
-    place = (estimate.u * search.box)[None]
-    found = curves(case, search.places, place, names, names)
+    """Return the outputs without a column, by rig and drawing, by name."""
     told = dict[str, Prediction]()
-    for name in names:
-        slopes = found.slopes[name][0] * search.box
+    for name, values, slopes in model.predicted(estimate.u):
         spread = np.sqrt(np.einsum("si,ij,sj->s", slopes, estimate.covariance, slopes))
         drawn = np.linalg.norm(slopes, axis=1)
         if np.nanmax(drawn, initial=0.0) > ZERO:
-            told[name] = Prediction(found.values[name][0], spread, drawn)
+            told[name] = Prediction(values, spread, drawn)
     return told

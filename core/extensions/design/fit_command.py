@@ -1,4 +1,4 @@
-"""kincheck fit: the table that a rig measured, and what the rig determines of it."""
+"""kincheck fit: the table behind the curves of a rig, with intervals."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ...errors import refuse
 from ...options import destination, group, json_file, option, options
 from .new_table import require_new, table_of, write_new
 
+DRAWING = "+- 2 mm"
+
 if TYPE_CHECKING:
     from ...case.case import Case
     from ...trajectory import Array
     from .fit import Fitted, Shift
 
-DRAWING = "+- 2 mm"
-
 
 @options
 class Fit(OfCase):
-    """Fit a table of hardpoints to curves that a rig measured, and say what the rig determines.
+    """Fit a table of hardpoints to curves of a rig, and tell how much the rig determines.
 
     The fit is the most likely table, by the noise of the rig and the deviation of the drawing. All
     intervals are of 95 %. Exit status: 0 the table fits, even if slips of the file fit as well;
@@ -62,7 +62,7 @@ class Fit(OfCase):
     curve: CurveOptions = group(default_factory=CurveOptions)
 
     def answer(self, registry: Registry) -> Fitted:
-        """Fit a table of hardpoints to curves that a rig measured.
+        """Fit a table of hardpoints to curves of a rig.
 
         Raises:
             KincheckError: a file or an option makes no sense, or the table does not reach the
@@ -174,5 +174,5 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
 
 
 def _plain(values: Array) -> list[float | None]:
-    """Return numbers, None for those that are unknown."""
+    """Return numbers, None for unknown ones."""
     return [x if np.isfinite(x) else None for x in values.tolist()]

@@ -1,8 +1,8 @@
-"""The page of a fit: what was measured and what is left of it, combinations, predictions, moves."""
+"""The report of a fit: verdict, curves and residuals, combinations, predictions, moves."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,7 +42,7 @@ def headline(found: Fitted) -> str:
 
 
 def report(found: Fitted) -> Report:
-    """Return what the rig says: the verdict first, then what it determines, if anything fits."""
+    """Return the verdict, then combinations, predictions and coordinates, if anything fits."""
     rig, first = found.rig, found.first
     facts = [
         f"{rig.count} numbers of {', '.join(goal.output for goal in rig.goals)}",
@@ -98,25 +98,22 @@ def _verdict(found: Fitted) -> Section:
 
 def _curves(found: Fitted) -> list[Diagram]:
     rig, model = found.rig, found.rig.model(found.boxes)
-    fitted = model.search.values(found.estimate.u)
-    drawn = model.search.values(np.zeros(len(found.boxes)))
-    along = found.along
+    fitted = model.values(found.estimate.u)
+    drawn = model.values(np.zeros(len(found.boxes)))
     diagrams = list[Diagram]()
     for goal, noise in zip(rig.goals, rig.noise, strict=True):
-        order = np.argsort(rig.case.sweep.values[goal.at], kind="stable")
-        travel, unit = rig.case.sweep.values[goal.at][order] / along.size, rig.unit(goal).size
+        name, values, along = rig.travel(goal)
+        order = np.argsort(values[goal.at], kind="stable")
+        travel, unit = values[goal.at][order] / along.size, rig.unit(goal).size
 
-        def line(style: Style, values: Array, x: Array = travel) -> Figure:
-            return style.curve(_short(x), _short(values), size=6)
-
-        def of(values: Array, goal: Goal = goal, order: Array = order, unit: float = unit) -> Array:
-            return values[goal.at][order] / unit
-
+        every = [_of(goal, each)[order] / unit for each in (drawn, fitted)]
         measured = goal.middle[order] / unit
         curves = [
-            line(_DRAWING, of(drawn[goal.output])),
-            line(_FIT, of(fitted[goal.output])),
-            line(_RIG, measured) | {"mode": "markers"},
+            *(
+                _line(style, travel, each)
+                for style, each in zip((_DRAWING, _FIT), every, strict=True)
+            ),
+            _line(_RIG, travel, measured) | {"mode": "markers"},
         ]
         half = NORMAL * noise[order] / unit
         band: Figure = {
@@ -131,11 +128,11 @@ def _curves(found: Fitted) -> list[Diagram]:
             "uid": _RIG.key,
             "name": "noise of the rig",
         }
-        rest = line(_RIG, measured - of(fitted[goal.output])) | {"mode": "markers"}
+        rest = _line(_RIG, travel, measured - every[1]) | {"mode": "markers"}
         for what, data in (("", curves), (" less the fitted table", [band, rest])):
             title = with_unit(goal.output + what, rig.unit(goal).name)
             layout: Figure = {
-                "xaxis": {"title": {"text": with_unit(rig.case.sweep.driver, along.name)}},
+                "xaxis": {"title": {"text": with_unit(name, along.name)}},
                 "yaxis": {"title": {"text": title}, "zeroline": True},
                 "hovermode": "x unified",
             }
@@ -144,11 +141,19 @@ def _curves(found: Fitted) -> list[Diagram]:
     return diagrams
 
 
+def _line(style: Style, x: Array, y: Array) -> Figure:
+    return style.curve(_short(x), _short(y), size=6)
+
+
+def _of(goal: Goal, values: Mapping[str, Array]) -> Array:
+    return values[goal.output][goal.at]
+
+
 def _combinations(found: Fitted) -> Section:
     """Return a bar for each combination: how many times better the rig tells it."""
     style = Style.number(0, "combination")
     every = found.combinations
-    unit = found.length
+    unit = found.rig.move
     gain = [each.drawing / each.deviation for each in every]
     told = [each for each in every if each.deviation < TOLD * each.drawing]
     bars: Figure = {
@@ -186,9 +191,10 @@ def _row(each: Combination, size: float) -> list[str]:
 
 def _predictions(found: Fitted) -> Section:
     rows = list[list[str]]()
+    _, travel, along = found.rig.travel(found.rig.goals[0])
     for name, each in found.predictions.items():
-        unit, k = found.unit_of(name), found.told_at(each)
-        where = f"{found.rig.case.sweep.values[k] / found.along.size:.4g} {found.along.name}"
+        unit, k = found.rig.unit_of(name), found.told_at(each)
+        where = f"{travel[k] / along.size:.4g} {along.name}"
         value, half, drawn = (x[k] / unit.size for x in (each.values, each.spread, each.drawing))
         texts = [f"{value:.5g}", f"{NORMAL * half:.2g}", f"{NORMAL * drawn:.2g}"]
         rows.append([with_unit(name, unit.name), where, *texts, each.source])
@@ -208,7 +214,7 @@ def _offsets(found: Fitted) -> Section:
 
 
 def _coordinates(found: Fitted) -> Section:
-    unit = found.length
+    unit = found.rig.move
     rows = [
         _row(
             Combination({place: 1.0}, move, found.deviations[place], found.boxes[place]), unit.size
@@ -244,8 +250,8 @@ def _moves(found: Fitted) -> tuple[Drawing, str]:
             for place in (at[name], at[name] + times * way):
                 drawn.nodes.append((0, *place.tolist()))
             drawn.rods.append((first, first + 1))
-            length = np.linalg.norm(way) / found.length.size
-            text = f"{name} {length:.2g} {found.length.name}"
+            length = np.linalg.norm(way) / found.rig.move.size
+            text = f"{name} {length:.2g} {found.rig.move.name}"
             drawn.labels.append((first + 1, first + 1, text))
     return drawn, f"{times:g}"
 

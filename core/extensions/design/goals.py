@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -31,8 +32,9 @@ _GOAL = re.compile(
     r"(?:\+-|\+/-|±)\s*(?P<tolerance>.+?)\s*"
 )
 _MOVE = re.compile(
-    r"\s*(?P<points>[^:]+?)\s*:\s*(?P<axes>[xyz](?:[\s,]*[xyz])*)?\s*(?:(?:\+-|\+/-|±)\s*(?P<box>.+?)\s*)?"
+    r"\s*(?P<points>[^:]+?)\s*:\s*(?P<axes>[xyz](?:[\s,]*[xyz])*)?\s*(?P<box>[+±].*?)?\s*"
 )
+_BOX = re.compile(r"(?:\+-|\+/-|±)?\s*(?P<both>[^+-]*)|\+(?P<high>[\d.\s]+)-(?P<low>[^+-]+)")
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
 
@@ -54,6 +56,19 @@ class Goal:
     at: NDArray[np.intp]
     middle: Array
     tolerance: float
+
+
+@dataclass(frozen=True)
+class Box:
+    """How far a place may move down and up an axis of the table [m]: low to high."""
+
+    low: float
+    high: float
+
+    @property
+    def size(self) -> float:
+        """The larger of both, by which moves are measured."""
+        return max(-self.low, self.high)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +129,8 @@ def read_goals(
     return case, goals, notes
 
 
-def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, float]:
-    """Return the half-width of the box of each place that may move [m].
+def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, Box]:
+    """Return the box of each place to move.
 
     Args:
         usual: box of moves without one.
@@ -126,7 +141,7 @@ def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, f
     rows = {role: each.name for each in case.hardpoints for role in each.roles}
     rows |= {each.name: each.name for each in case.hardpoints}
     moving = {each.name for each in case.hardpoints if each.moves}
-    found = dict[str, float]()
+    found = dict[str, Box]()
     for text in texts:
         read = _MOVE.fullmatch(text)
         if read is None or not (read["box"] or usual):
@@ -149,22 +164,25 @@ def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, f
     return found
 
 
-def read_box(text: str, what: str, case: Case) -> float:
-    """Return the half-width of a box [m].
+def read_box(text: str, what: str, case: Case) -> Box:
+    """Return a box: "+- 15 mm", or "+5 -10 mm".
 
     Raises:
         KincheckError: it is no positive length.
     """
-    try:
-        box = measure(re.sub(r"^\s*(\+-|\+/-|±)", "", text), LENGTHS, case.length_unit)[0]
-    except ValueError:
-        box = np.nan
-    if not 0.0 < box < np.inf:
+    found, low, high = _BOX.fullmatch(text.strip()), np.nan, np.nan
+    if found is not None:
+        with suppress(ValueError):
+            lower, unit = measure(found["both"] or found["low"] or "", LENGTHS, case.length_unit)
+            bare = unit or case.length_unit
+            low = -lower
+            high = lower if found["high"] is None else LENGTHS[bare](float(found["high"]))
+    if not (-np.inf < low <= 0.0 <= high < np.inf and low < high):
         raise KincheckError(
             f"{what}: found the box {text!r}, expected a positive length with a unit; say +- 15"
-            f" {case.length_unit}"
+            f" {case.length_unit}, or +5 -10 {case.length_unit}"
         )
-    return box
+    return Box(low, high)
 
 
 def _draft(text: str, case: Case) -> _Draft:
@@ -192,7 +210,7 @@ def _draft(text: str, case: Case) -> _Draft:
 
 
 def _unit(text: str, name: str, case: Case, output: str) -> Unit:
-    """Return a unit of an output by its name; without one, that of the table."""
+    """Return a unit of an output by its name; without one, the table's."""
     si = next(each.unit for each in case.outputs if each.name == output)
     expected, found = read_unit(si), read_unit(name or _of_table(si, case))
     if found is not None and expected is not None and found[1] == expected[1]:

@@ -1,4 +1,4 @@
-"""What measured curves determine: combinations of moves, and moves without any effect."""
+"""Combinations of moves by measured curves, and moves without any effect."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from ...case.case import Case
 from ...trajectory import Array
 from .likely import Estimate
 
-NULL, NAMED = 1e-15, 1e-13
-"""A combination with this part of the largest effect has none, by the round-off of exact slopes. Of
-all combinations some have little more; of those that can be named none has.
-"""
+NAMED = 100.0
+"""Moves that can be named may have so many times the effect of round-off: no others have little
+more than none."""
 # Directions of size one are another, if so much is left beside those known.
 _OWN = 1e-3
 MOST_TERMS, LEAST_TERM = 4, 0.1
@@ -28,7 +27,7 @@ class Combination:
 
     Attributes:
         terms: coefficients by place.
-        value, deviation, drawing: its size, its deviation, and that by the drawing [m].
+        value, deviation, drawing: its size, and its deviations by the rig and by the drawing [m].
     """
 
     terms: Mapping[str, float]
@@ -60,7 +59,7 @@ def source(deviation: float, drawing: float) -> str:
 
 
 def combinations(estimate: Estimate, boxes: Mapping[str, float]) -> list[Combination]:
-    """Return the combinations of moves that the numbers tell apart, the best known first."""
+    """Return the combinations of moves, the best known first."""
     found = list[Combination]()
     for size, row in zip(*estimate.decomposed, strict=True):
         terms = row / np.array([*boxes.values()])
@@ -77,12 +76,15 @@ def combinations(estimate: Estimate, boxes: Mapping[str, float]) -> list[Combina
     return found
 
 
-def without_effect(slopes: Array, case: Case, moves: Mapping[str, float], box: Array) -> list[str]:
+def without_effect(
+    slopes: Array, null: float, case: Case, moves: Mapping[str, float], box: Array
+) -> list[str]:
     """Return names of combinations of moves without effect, as many as there are: places, points
-    that slide along the line to another one, all points together, and else their terms.
+    along the line to another one, all points together, and else their terms.
 
     Args:
         slopes: by the moves over their boxes, rows of size one.
+        null: round-off, over the largest effect.
         moves: by place [m].
     """
     largest = np.linalg.norm(slopes, 2)
@@ -91,13 +93,13 @@ def without_effect(slopes: Array, case: Case, moves: Mapping[str, float], box: A
         u = direction / box
         u /= np.linalg.norm(u)
         own = u - known.T @ (known @ u)
-        if np.linalg.norm(own) > _OWN and np.linalg.norm(slopes @ u) <= NAMED * largest:
+        if np.linalg.norm(own) > _OWN and np.linalg.norm(slopes @ u) <= NAMED * null * largest:
             names.append(name)
             known = np.vstack([known, own / np.linalg.norm(own)])
     others = np.linalg.svd(known)[2][len(known) :] if len(known) else np.eye(len(box))
     _, sizes, rows = np.linalg.svd(slopes @ others.T)
     sizes = np.append(sizes, np.zeros(len(rows) - len(sizes)))
-    for row in rows[sizes <= NULL * largest] @ others:
+    for row in rows[sizes <= null * largest] @ others:
         terms = row * box
         places = zip(moves, (terms / terms[np.abs(terms).argmax()]).tolist(), strict=True)
         names.append(Combination(dict(places), 0.0, 0.0, 0.0).words)
@@ -105,7 +107,7 @@ def without_effect(slopes: Array, case: Case, moves: Mapping[str, float], box: A
 
 
 def _candidates(case: Case, moves: Mapping[str, float]) -> Iterator[tuple[str, Array]]:
-    """Yield names and directions of moves [m] that may have no effect, the plainest first."""
+    """Yield names and directions of moves [m] with possibly no effect, the plainest first."""
     places = [*moves]
     for place in places:
         yield f"{place} alone", np.array([float(each == place) for each in places])

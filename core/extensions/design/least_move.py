@@ -1,8 +1,8 @@
-"""The least move of a design that brings its outputs into bands.
+"""The least move of a design to bring its outputs into bands.
 
 With u the moves over their boxes, and g(u) the outputs over their bands, -1 to 1 within:
 
-    minimise |u|^2  such that  -1 <= g(u) <= 1,  -1 <= u <= 1.
+    minimise |u|^2  such that  -1 <= g(u) <= 1,  low <= u <= high.
 
 A round linearises g by its exact slopes, inside a region of trust. A linear programme tells by how
 much the linear bands must be exceeded, t. The move of least norm that exceeds them by t is then a
@@ -38,14 +38,14 @@ _WEIGHT = 1e3
 
 @dataclass(frozen=True, eq=False)
 class LeastMove:
-    """Where a search ends.
+    """The end of a search.
 
     Attributes:
         moves: over their boxes, shape (moves,).
         excess: by how much the worst number is beyond its band, over the half-width; not positive
             if all bands are held.
-        multipliers: what the norm falls by, if each band becomes wider by its half-width, shape
-            (numbers,); of bands that cannot be held, the share of each in that.
+        multipliers: by how much the norm falls, if each band becomes wider by its half-width, shape
+            (numbers,); of bands beyond reach, the share of each.
         rounds: of linearisation.
     """
 
@@ -70,8 +70,12 @@ class LeastMove:
         return (False, self.norm) if self.held else (True, self.excess)
 
 
-def least_move(bands: Bands, start: Array) -> LeastMove | None:
-    """Return where the search from a start ends; None if a sample of the start is not reached."""
+def least_move(bands: Bands, start: Array, low: Array, high: Array) -> LeastMove | None:
+    """Return where the search from a start ends; None if a sample of the start is not reached.
+
+    Args:
+        low, high: ends of the box, shape (moves,).
+    """
     found = bands(start)
     if found is None:
         return None
@@ -79,7 +83,9 @@ def least_move(bands: Bands, start: Array) -> LeastMove | None:
     multipliers, rounds = np.zeros(len(g)), 0
     while rounds < ROUNDS and trust >= _LEAST_TRUST:
         rounds += 1
-        new, excess, multipliers = _of_linear(u, g, slopes, trust)
+        new, excess, multipliers = _of_linear(
+            u, g, slopes, np.maximum(low, u - trust), np.minimum(high, u + trust)
+        )
         weight = max(weight, 4.0 * float(multipliers.sum()))
         merit = _merit(u, float(np.abs(g).max()) - 1.0, weight)
         expected = merit - _merit(new, excess, weight)
@@ -105,11 +111,12 @@ def _merit(u: Array, excess: float, weight: float) -> float:
     return float(u @ u) + weight * max(excess, 0.0)
 
 
-def _of_linear(u: Array, g: Array, slopes: Array, trust: float) -> tuple[Array, float, Array]:
+def _of_linear(
+    u: Array, g: Array, slopes: Array, low: Array, high: Array
+) -> tuple[Array, float, Array]:
     """Return the moves of least norm that exceed the linear bands least, by how much they do, and
     the multiplier of each number.
     """
-    low, high = np.maximum(-1.0, u - trust), np.minimum(1.0, u + trust)
     shift, n = g - slopes @ u, len(u)
     rows = np.vstack([slopes, -slopes])
     free = np.concatenate([-1.0 - shift, shift - 1.0])  # rows @ v >= free - t

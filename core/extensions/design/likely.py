@@ -1,15 +1,15 @@
-"""The most likely parameters, by measured numbers and by what was known before.
+"""The most likely parameters, by measured numbers and by earlier knowledge.
 
 With u the parameters over their known deviations, r(u) the model's numbers less the measured ones
 over their noise, and J the slopes of r, both noise and u are normal:
 
     minimise |Q r(u)|^2 + |u|^2.
 
-Q takes out shifts of the numbers of any size: those that the data may have. The minimum is
-chi-square distributed with a degree of freedom for each number that is left (the marginal
+Q takes out possible shifts of the numbers, of any size. The minimum is
+chi-square distributed with a degree of freedom for each remaining number (the marginal
 likelihood of a linear model), and the covariance of u is that of the linear model there,
 (1 + J'QJ)^-1: a singular value s of QJ tells one combination of parameters sqrt(1 + s^2) times
-better than before, one that is zero not at all.
+better than before, and zero not at all.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _special: Any = scipy.special
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Parameters and what is known of them.
+    """Parameters and their intervals.
 
     Attributes:
         u: parameters over their known deviations, shape (parameters,).
@@ -73,8 +73,8 @@ class Estimate:
 
     @property
     def evidence(self) -> float:
-        """Minus twice the logarithm of the data's probability, but for a constant: a model that
-        could do anything gets less of it than one that does what was measured.
+        """Minus twice the logarithm of the data's probability, but for a constant: a model
+        of anything gets less of it than one of these data.
         """
         sizes, _ = self.decomposed
         return self.misfit + float(np.log1p(sizes**2).sum())

@@ -25,7 +25,7 @@ DIGITS = 12
 
 
 def require_new(out: Path | None) -> None:
-    """Refuse a file that exists, or is no CSV.
+    """Refuse an existing file, and one without the suffix of CSV.
 
     Raises:
         KincheckError: it is so.
@@ -57,7 +57,7 @@ def write_new(
     moves: Mapping[str, float],
     registry: Registry,
 ) -> str | None:
-    """Write a table with moves by place [m], and return the engine that solved it again; None
+    """Write a table with moves by place [m], and return the engine of its check; None
     without one.
 
     Raises:
@@ -108,7 +108,7 @@ def case_of_points(
 
 
 def check(old: Case, new: Case, registry: Registry) -> tuple[str | None, Results]:
-    """Return the engine that solved the new design again, and the results of the native one.
+    """Return the engine of the check, and the results of the native one.
 
     Raises:
         KincheckError: an engine contradicts the native one.

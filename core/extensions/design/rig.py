@@ -4,20 +4,20 @@ its samples scatter.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from ...case.case import Case
+from ...case.case import PER_TRAVEL, TIME, Case, Output
 from ...case.io.reader_options import CurveOptions
 from ...case.io.reference_curve import with_curve
-from ...case.units import Unit
+from ...case.units import SECOND, Unit
 from ...errors import KincheckError
 from ...trajectory import Array
-from ..sweep.curves import curves
+from ..sweep.curves import DesignCurves, curves
 from .goals import Goal, unit_in_table
 from .tune import Search
 
@@ -27,16 +27,20 @@ few samples, of a third of them, and not with fewer than nine."""
 SCATTER = 2.0
 """Scatter this many times the noise of the digits is noise of the rig."""
 # The median of absolute values of normal numbers, and the width of evenly spread rounding.
-_MEDIAN, _EVEN = 0.6744897501960817, 3.0**-0.5
+_MEDIAN, EVEN = 0.6744897501960817, 3.0**-0.5
 LONG, LONGEST = 3.0, 121
 """Times the travel of rig and table, and samples, on which combinations without effect are told."""
+NULL = 1e-15
+"""Moves with this part of the largest effect have none, by the round-off of exact slopes."""
+ROUND_OFF = 1e-9
+"""Effects smaller than this part of the largest are none: real ones are a thousand times larger."""
 STEP = 1e-4
 """Step of the travel for slopes by it [m or rad]: round-off and curvature change them by 1e-8."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """What a rig measured.
+    """Curves of a rig as numbers.
 
     Attributes:
         file: of the numbers.
@@ -75,9 +79,26 @@ class Rig:
         """Output and sample of each number."""
         return [(goal, int(k)) for goal in self.goals for k in goal.at]
 
+    @property
+    def move(self) -> Unit:
+        """The unit in which moves are told."""
+        return unit_in_table("m", self.case)
+
+    def travel(self, goal: Goal) -> tuple[str, Array, Unit]:
+        """Return name, values and unit of the samples of an output."""
+        sweep = self.case.sweep
+        if sweep.driver == TIME:
+            return TIME, sweep.values, SECOND
+        turns = self.case.mechanism.driver(sweep.driver).turns
+        return sweep.driver, sweep.values, unit_in_table("rad" if turns else "m", self.case)
+
     def unit(self, goal: Goal) -> Unit:
         """Return the unit of an output as the table has it."""
-        si = next(each.unit for each in self.case.outputs if each.name == goal.output)
+        return self.unit_of(goal.output)
+
+    def unit_of(self, output: str) -> Unit:
+        """Return the unit of an output by its name, as the table has it."""
+        si = next(each.unit for each in self.case.outputs if each.name == output)
         return unit_in_table(si, self.case)
 
     def rows(self, goal: Goal) -> Array:
@@ -109,25 +130,75 @@ class RigModel:
     rig: Rig
     search: Search
 
+    @property
+    def boxes(self) -> Mapping[str, float]:
+        """Deviation of each place by the drawing."""
+        return self.search.boxes
+
     def __call__(self, u: Array) -> tuple[Array, Array] | None:
         """Return numbers and slopes as `most_likely` asks for them."""
         found = self.search(u)
         weights = self.rig.weights
         return (found[0] * weights, found[1] * weights[:, None]) if found else None
 
-    def by_travel(self, u: Array) -> Array:
-        """Return the slopes of the numbers by the travel [SI]; NaN if a sample near is not
-        reached.
+    def values(self, u: Array) -> dict[str, Array]:
+        """Return the outputs of a design at the samples, shape (n,) each.
+
+        Raises:
+            KincheckError: a sample is not reached.
         """
-        search = self.search
-        found = curves(self.rig.near, search.places, (u * search.box)[None], search.names)
+        remedy = "leave out the rows of the rig beyond it, or correct the table"
+        return self.search.values(u, remedy)
+
+    def by_travel(self, u: Array) -> Array | None:
+        """Return the slopes of the numbers by the travel [SI]; None if a sample near is not
+        reached, or there is no travel.
+        """
+        if self.rig.case.sweep.driver == TIME:
+            return None
+        found = self._curves(self.rig.near, u, [])
         ends = {name: values[0].reshape(2, -1) for name, values in found.values.items()}
-        slopes = {name: (a - b) / (2.0 * STEP) for name, (a, b) in ends.items()}
-        return self.rig.of(slopes)
+        slopes = self.rig.of({name: (a - b) / (2.0 * STEP) for name, (a, b) in ends.items()})
+        return slopes if np.isfinite(slopes).all() else None
+
+    def over_travel(self, u: Array) -> tuple[Array, float]:
+        """Return slopes of the outputs over a long travel as far as it is reached, each row of size
+        one, and their round-off. Moves without effect over a part of the travel have none anywhere,
+        and a longer part tells them better from a small effect.
+        """
+        found = self._curves(self.rig.long, u, self.search.names)
+        kept = list[Array]()
+        for each in found.slopes.values():
+            rows = each[0] * self.search.box
+            size = np.linalg.norm(rows, axis=1)
+            known = size > ROUND_OFF * np.nanmax(size)  # at design some are zero
+            kept.append(rows[known] / size[known, None])
+        return np.concatenate(kept), NULL
+
+    def predicted(self, u: Array) -> Iterator[tuple[str, Array, Array]]:
+        """Yield the outputs without a column: name, values, and slopes by the moves over
+        their boxes.
+        """
+        case, names = self.rig.case, self.search.names
+        others = [
+            each.name
+            for each in case.outputs
+            if not (each.forces or isinstance(each, Output))
+            and PER_TRAVEL not in each.name
+            and each.name not in names
+        ]
+        if others:
+            found = curves(case, self.search.places, (u * self.search.box)[None], others, others)
+            for name, values in found.values.items():
+                yield name, values[0], found.slopes[name][0] * self.search.box
+
+    def _curves(self, case: Case, u: Array, slopes: Sequence[str]) -> DesignCurves:
+        search = self.search
+        return curves(case, search.places, (u * search.box)[None], search.names, slopes)
 
 
 def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
-    """Return what a rig measured, with the noise of its digits or as it is stated.
+    """Return the numbers of a rig, with the noise of its digits or as it is stated.
 
     Raises:
         CaseError: the file cannot be read, or has no output of the case.
@@ -141,24 +212,24 @@ def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
             continue
         at = np.flatnonzero(np.isfinite(series.position))
         unit = unit_in_table(each.unit, case)
-        digits = _EVEN * series.uncertainty.get("position", np.zeros(len(series.position)))[at]
+        digits = EVEN * series.uncertainty.get("position", np.zeros(len(series.position)))[at]
         stated = each.atol if each.why != known[each.name] else 0.0
         named = each.name, each.name, (unit.name, unit.size)
         goals.append(Goal(*named, at, series.position[at], 1.0))
         noise.append(np.hypot(digits, stated))
         sources.append("as stated" if stated else "printed digits")
-    at = found.sweep.values
-    every = np.concatenate([found.sweep.change, case.sweep.change])
-    ends = np.linspace(LONG * every.min(), LONG * every.max(), LONGEST)
-    travels = [
-        *(at, np.concatenate([at + STEP, at - STEP]), 2.0 * found.sweep.design - at),
-        found.sweep.design + ends,
-    ]
-    cases = [
-        replace(found, sweep=replace(found.sweep, values=values), reference={})
-        for values in travels
-    ]
-    return Rig(file, *cases, goals, noise, sources, notes)
+    sweep, at = found.sweep, found.sweep.values
+    every = np.concatenate([sweep.change, case.sweep.change])
+    long = np.linspace(LONG * float(every.min()), LONG * float(every.max()), LONGEST)
+
+    def over(values: Array) -> Case:
+        return replace(found, sweep=replace(sweep, values=values), reference={})
+
+    return Rig(
+        *(file, over(at), over(np.concatenate([at + STEP, at - STEP]))),
+        *(over(2.0 * sweep.design - at), over(sweep.design + long)),
+        *(goals, noise, sources, notes),
+    )
 
 
 def with_scatter(rig: Rig, drawn: Mapping[str, Array]) -> Rig:
@@ -173,7 +244,7 @@ def with_scatter(rig: Rig, drawn: Mapping[str, Array]) -> Rig:
     """
     noise, sources = [*rig.noise], [*rig.sources]
     for k, goal in enumerate(rig.goals):
-        travel = rig.case.sweep.values[goal.at]
+        travel = rig.travel(goal)[1][goal.at]
         count = len({*travel.tolist()})
         if sources[k] != "as stated" and count >= FEWEST:
             off, degree = goal.middle - drawn[goal.output][goal.at], min(DEGREE, count // 3)

@@ -20,7 +20,7 @@ from ..hardpoints.options import WheelOptions
 from ..hardpoints.reader import read_hardpoints
 from ..hardpoints.table import HardpointTable, unit_of
 from ..sweep.curves import curves
-from .goals import Goal, read_goals, read_moves
+from .goals import Box, Goal, read_goals, read_moves
 from .least_move import HELD, LeastMove, least_move
 from .new_table import case_of_points, check, moved_points
 
@@ -31,14 +31,14 @@ SAME_NORM = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """A goal and what becomes of it [SI].
+    """A goal before and after [SI].
 
     Attributes:
         before, after: smallest and largest value at its samples.
         excess: beyond the band, over its half-width; not positive if it is held.
         tight: driver values at which it is tight.
         worst: driver value nearest to an edge, or farthest beyond.
-        multiplier: what the norm falls by, for each unit by which the band becomes wider.
+        multiplier: by how much the norm falls, for each unit by which the band becomes wider.
     """
 
     goal: Goal
@@ -70,15 +70,15 @@ class Band:
         return self.goal.tolerance / self.goal.unit[1]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tuned:
     """The answer.
 
     Attributes:
-        moves, boxes: by place [m], along the axes of the table.
-        rounds: of linearisation, over all starts; designs: that were solved.
-        ends: the norm that each start ends with, None where it does not reach the target.
-        checked: the engine that solved the answer again; None without one.
+        moves, boxes: by place, moves in m, along the axes of the table.
+        rounds: of linearisation, over all starts; designs: number of those solved.
+        ends: the norm at the end of each start, None for one beyond the target.
+        checked: the engine of the check; None without one.
         table, points: the table as read, and its new points in its own units.
         comparison: old against new; None if the target is not reached.
         length: unit of the table.
@@ -87,7 +87,7 @@ class Tuned:
     case: Case
     move: LeastMove
     moves: Mapping[str, float]
-    boxes: Mapping[str, float]
+    boxes: Mapping[str, Box]
     bands: Sequence[Band]
     rounds: int
     designs: int
@@ -98,6 +98,10 @@ class Tuned:
     points: Sequence[tuple[float, float, float]]
     comparison: Report | None
     length: Unit
+
+    def __repr__(self) -> str:
+        how = "reached" if self.reached else "not reached"
+        return f"<Tuned: {self.case.name}, {how}, norm {self.move.norm:.6g}>"
 
     @property
     def reached(self) -> bool:
@@ -168,7 +172,7 @@ def tune(
     starts: int,
     registry: Registry,
 ) -> Tuned:
-    """Return the least move that holds all bands, or the nearest miss.
+    """Return the least move to hold all bands, or the nearest miss.
 
     Args:
         file: the table of the case, read with `supplied`.
@@ -182,14 +186,16 @@ def tune(
     of_goals, of_moves = wanted
     case, goals, notes = read_goals(of_goals, case, supplied)
     boxes = read_moves(of_moves, case)
-    search = Search(case, goals, boxes)
+    search = Search(case, goals, {place: each.size for place, each in boxes.items()})
+    low = np.array([each.low for each in boxes.values()]) / search.box
+    high = np.array([each.high for each in boxes.values()]) / search.box
     before = search.values(np.zeros(len(boxes)))
     random = np.random.default_rng(0)  # the same answer each time
-    others = random.uniform(-1.0, 1.0, (starts - 1, len(boxes)))
+    others = random.uniform(low, high, (starts - 1, len(boxes)))
     found = [
         end
         for start in (np.zeros(len(boxes)), *others)
-        if (end := least_move(search, start)) is not None
+        if (end := least_move(search, start, low, high)) is not None
     ]
     best = min(found, key=lambda each: each.order)
 

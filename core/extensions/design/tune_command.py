@@ -1,4 +1,4 @@
-"""kincheck tune: the least change of a table of hardpoints that reaches a target."""
+"""kincheck tune: the least change of a table of hardpoints to reach a target."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STARTS = 6
 
 @options
 class Tune(OfCase):
-    """Find the least change of a table of hardpoints that brings outputs into bands.
+    """Find the least change of a table of hardpoints to bring outputs into bands.
 
     The change is least in its norm: the root of the sum of squares of all moves over their boxes.
     The search is local, from several starts. Another engine solves the answer again before it is
@@ -36,8 +36,8 @@ class Tune(OfCase):
         required=True,
     )
     move: tuple[str, ...] = option(
-        'points that may move, their axes in the table and their box: "tierod_inner: y z +- 15 mm";'
-        " may be repeated",
+        'points that may move, their axes in the table and their box: "tierod_inner: y z +- 15 mm",'
+        ' "uca_outer: z +5 -10 mm"; may be repeated',
         metavar="MOVE",
         several="repeated",
         required=True,
@@ -52,18 +52,27 @@ class Tune(OfCase):
     out: Path | None = destination("write the new table, as CSV", Path)
     json: str | None = json_file("the answer")
 
+    def answer(self, registry: Registry) -> Tuned:
+        """Find the least change of a table of hardpoints to bring outputs into bands.
+
+        Raises:
+            KincheckError: a goal or move makes no sense, the table does not reach its travel, or
+                another engine contradicts the answer.
+        """
+        from .tune import tune
+
+        case, file = table_of(self, registry)
+        return tune(case, file, self.supplied, (self.goal, self.move), self.starts, registry)
+
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ...report.sections import print_report
         from ...report.terminal import with_json
         from ..hardpoints.saving import write_table
-        from .tune import tune
 
         require_new(self.out)
         refuse(self.unwritable())
-        case, file = table_of(self, registry)
-        wanted = self.goal, self.move
-        found = tune(case, file, self.supplied, wanted, self.starts, registry)
+        found = self.answer(registry)
         if found.reached and self.out is not None:
             write_table(found.table, self.supplied, found.points, self.out, f"--out {self.out}")
         with with_json(_facts(found, self.out), self.json) as console:
@@ -84,7 +93,7 @@ def _facts(found: Tuned, out: Path | None) -> dict[str, Any]:
         "search": "local",
         "norm": found.move.norm,
         "moves_m": found.moves,
-        "boxes_m": found.boxes,
+        "boxes_m": {name: [each.low, each.high] for name, each in found.boxes.items()},
         "bands": [
             {
                 "goal": each.goal.text,
@@ -136,10 +145,11 @@ def _lines(found: Tuned) -> list[str]:
         lines.append(line)
     for name, move in found.moves.items():
         box = found.boxes[name]
-        at_end = ", the end of its box" if abs(move) >= box * (1.0 - 1e-6) else ""
+        gap = min(box.high - move, move - box.low)
+        at_end = ", the end of its box" if gap <= 1e-6 * box.size else ""
         unit = found.length
         lines.append(
             f"  {name}: {move / unit.size:+.4f} {unit.name},"
-            f" box +- {number(box / unit.size)}{at_end}"
+            f" box {number(box.low / unit.size)} to {number(box.high / unit.size)}{at_end}"
         )
     return lines

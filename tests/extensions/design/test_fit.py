@@ -265,6 +265,20 @@ def test_fit_written_table_gives_curves(bench, tmp_path, capsys):
         assert np.sqrt(np.mean((found[name][0] - values[name]) ** 2)) < 1.5 * noise
 
 
+def test_fit_right_wheel_is_mirrored(bench, tmp_path):
+    file, _, values, _ = bench
+    rig = rig_file(tmp_path / "rig.csv", values)
+    lines = file.read_text().replace("# units", "# side: right\n# units").splitlines()
+    cells = [line.split(",") for line in lines]
+    rows = [c if len(c) != 4 or c[0] == "name" else [*c[:2], f"-{c[2]}", c[3]] for c in cells]
+    right = tmp_path / "right.csv"
+    right.write_text("\n".join(map(",".join, rows)) + "\n")
+    how = {"measured": rig, "move": ["tierod_inner, uca_outer: y z"]}
+    left, other = (kincheck.fit(each, **how).moves for each in (file, right))
+    for place, move in left.items():
+        assert other[place] == pytest.approx(-move if place.endswith("y") else move, abs=1e-6)
+
+
 def test_fit_reads_german_rig(tmp_path, capsys):
     file = table(tmp_path, "double_wishbone")
     rig = tmp_path / "pruefstand.csv"
@@ -283,6 +297,7 @@ def test_fit_reads_german_rig(tmp_path, capsys):
         (["--move", "tierod_iner: y"], "did you mean 'tierod_inner'?"),
         (["--drawing", "2 deg"], "--drawing '2 deg': found the box '2 deg'"),
         (["--free", "toe zer"], "did you mean 'toe zero'?"),
+        (["--move", "uca_outer: z +5 -2 mm"], "a deviation is the same both ways"),
         (["--accuracy", "toe=x"], "expected a positive number"),
     ],
 )

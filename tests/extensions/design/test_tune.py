@@ -99,7 +99,8 @@ def tune(car, goals, *moves):
     return status, json.loads(found.read_text()), new
 
 
-def test_tune_agrees_with_another_optimiser(car):
+@pytest.mark.parametrize("starts", [5, pytest.param(20, marks=pytest.mark.nightly)])
+def test_tune_agrees_with_another_optimiser(car, starts):
     moves = "tierod_inner: y z +- 15mm", "tierod_outer, uca_outer: z +- 15 mm"
     status, found, new = tune(car, GOALS, *moves)
     assert status == 0
@@ -108,7 +109,7 @@ def test_tune_agrees_with_another_optimiser(car):
     assert beyond(u).min() > -1e-6
     ends = []
     random = np.random.default_rng(5)
-    for start in [np.zeros(4), *random.uniform(-0.5, 0.5, (4, 4))]:
+    for start in [np.zeros(4), *random.uniform(-0.5, 0.5, (starts - 1, 4))]:
         end = minimize(
             lambda u: u @ u,
             start,
@@ -158,6 +159,22 @@ def test_tune_small_box_is_unreachable(car, capsys):
     assert min(excess) > 0.0
 
 
+def test_tune_box_ends_where_stated(car, capsys):
+    status, found, _ = tune(car, GOALS[:1], "tierod_inner: z +5 -10 mm")
+    assert status == 0
+    move = found["moves_m"]["tierod_inner z"]
+    assert found["norm"] == pytest.approx(abs(move) / 0.010)
+    assert found["boxes_m"] == {"tierod_inner z": [-0.010, 0.005]}
+    assert move < 0.0
+    clear(car)
+    status, found, _ = tune(car, GOALS[:1], f"tierod_inner: z +15 -{0.9e3 * -move:.6f} mm")
+    assert status == 1
+    assert "the end of its box" in capsys.readouterr().out
+    how = {"move": ["tierod_inner: z +5 -10 mm"], "supplied": kincheck.Supplied(travel="30mm:7")}
+    tuned = kincheck.tune(car, goal=GOALS[:1], starts=1, **how)
+    assert tuned.moves["tierod_inner z"] == pytest.approx(move, abs=1e-9)
+
+
 def test_tune_follows_measured_curve(car):
     offset = [0.003, -0.004]
     places = ["tierod_inner y", "tierod_inner z"]
@@ -184,6 +201,7 @@ def test_tune_follows_measured_curve(car):
         ("toe = 0 +- 1 deg", "tierod_inner: y", "expected points, axes and a box"),
         ("toe = 0 +- 1 deg", "tierod_inner: y y +- 1 mm", "is given twice"),
         ("toe = 0 +- 1 deg", "tierod_inner: y +- 1 deg", "expected a positive length"),
+        ("toe = 0 +- 1 deg", "tierod_inner: y +5 mm", "expected a positive length"),
     ],
 )
 def test_tune_bad_text_is_refused(car, capsys, goal, move, message):
