@@ -145,8 +145,11 @@ class LiveTable(LiveFile):
             varied=self.variation is not None,
         )
 
-    def edited_case(self, points: Rows) -> Case:
+    def edited_case(self, points: Rows, *, followed: bool = True) -> Case:
         """Return the case of the table with other numbers, by the reader's own rules.
+
+        Args:
+            followed: see `case_of_hardpoints`.
 
         Raises:
             KincheckError: there are more or fewer points, or the reader refuses them.
@@ -157,7 +160,8 @@ class LiveTable(LiveFile):
             name: Hardpoint(row, self.table.points[name].where)
             for name, row in zip(self.names, points, strict=True)
         }
-        case = case_of_hardpoints(replace(self.table, points=moved), self.supplied)
+        table = replace(self.table, points=moved)
+        case = case_of_hardpoints(table, self.supplied, followed=followed)
         # those of the reference, if they were asked for
         return replace(case, sweep=replace(case.sweep, values=self.case.sweep.values))
 
@@ -169,7 +173,7 @@ class LiveTable(LiveFile):
             KincheckError: the reader refuses the points.
         """
         times = [perf_counter()]
-        case = self.edited_case(asked.points)
+        case = self.edited_case(asked.points, followed=False)
         times.append(perf_counter())
         found = self._current(case).solve(geometry_of(case), alone=asked.whole)
         times.append(perf_counter())
