@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Generator, Iterable, Sequence
+import shlex
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
+from pathlib import Path
 
 from .failures import FailureKind
 
@@ -83,6 +85,39 @@ class CaseError(KincheckError, ValueError):
     """A case file cannot be read or does not follow the schema; the message names file and key."""
 
 
+class OpenError(CaseError):
+    """A file leaves facts open that options of its reader state.
+
+    Attributes:
+        why: the guess of each option, and why, a line each.
+        stated: the guess by the options' fields; reading goes on with it.
+        writes: texts of new files that the options name.
+    """
+
+    def __init__(
+        self, file: Path, why: Sequence[str], stated: Mapping[str, str], writes: Mapping[Path, str]
+    ) -> None:
+        self.file, self.why, self.stated, self.writes = file, why, stated, writes
+        told = " ".join(map(str.strip, why))
+        add = shlex.join(self.options)
+        super().__init__(f"{file} leaves open what options state. Guess: {told} Add: {add}")
+
+    @property
+    def options(self) -> list[str]:
+        """The guess as arguments of the command line."""
+        found = [(f"--{name.replace('_', '-')}", text) for name, text in self.stated.items()]
+        return [each for pair in found for each in pair]
+
+    def with_others(self, other: OpenError) -> OpenError:
+        """Return one question of two."""
+        return OpenError(
+            self.file,
+            [*self.why, *other.why],
+            {**self.stated, **other.stated},
+            {**self.writes, **other.writes},
+        )
+
+
 class SolveError(KincheckError, RuntimeError):
     """The mechanism cannot be solved as described: freedom left, contradiction, or no assembly."""
 
@@ -130,11 +165,13 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
 def remedy(name: str, known: Iterable[str]) -> str:
     """Return the remedy for an unknown name: the most similar known one, else all of them."""
     names = sorted(known)
+    if not names:
+        return "there is none here: define it, or leave it out"
     close = similar(name, names)
     return (
         f"did you mean {close!r}?"
         if close
-        else f"known: {shortened([*map(brief, names)], MOST_NAMED) or 'none'}"
+        else f"known: {shortened([*map(brief, names)], MOST_NAMED)}"
     )
 
 

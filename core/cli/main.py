@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TextIO, TypeVar
 
-from ..errors import KincheckError
+from ..errors import KincheckError, OpenError
 from ..extras import THREADS
 from ..harness.interrupts import Terminated, listening, status_of, words_of
 from ..options import function_of
@@ -68,6 +68,8 @@ def _done(argv: list[str]) -> int:
             for where in options.joint_type:
                 load_joint(where)
         return _flush_output(int(options.do(options, registry())))
+    except OpenError as error:
+        return _ask(argv, error)
     except KincheckError as error:
         complain(str(error).splitlines())
     except SystemExit as end:
@@ -95,6 +97,27 @@ def _done(argv: list[str]) -> int:
     except Exception:  # a defect in kincheck is not status 1, which means a deviation
         traceback.print_exc()
     return Status.FAILED
+
+
+def _ask(argv: list[str], error: OpenError) -> int:
+    """Show the guess of what a file leaves open, as a command line with why. At a terminal, Enter
+    takes it; elsewhere the command ends, for nobody has agreed.
+    """
+    from ..report.progress import complain
+    from .registry import Status
+
+    whole = [*argv, *error.options]
+    complain([f"{error.file} leaves open what options state. The best guess:", *error.why])
+    for path, text in error.writes.items():
+        try:
+            path.write_text(text, encoding="utf-8")
+        except OSError as problem:
+            complain([f"{path} cannot be written ({problem.strerror}). Write it yourself:", text])
+    complain([f"Take it: {shlex.join(['kincheck', *whole])}"])
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return Status.FAILED
+    print("Enter takes it, any other answer ends: ", end="", file=sys.stderr, flush=True)
+    return _done(whole) if sys.stdin.readline() == "\n" else Status.FAILED
 
 
 def _be_able_to_print() -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import NOTHING, Supplied
 from ..case.io.readers import LEFT_OUT
-from ..errors import MOST_NAMED, KincheckError, SolveError, shortened, unknown
+from ..errors import MOST_NAMED, KincheckError, OpenError, SolveError, shortened, unknown
 from ..report.progress import complain
 from .class_loading import WHERE, create_engine, load_engine
 
@@ -172,6 +172,8 @@ class Registry:
             try:
                 case = self.find_case(name, supplied, driven=driven)
             except KincheckError as error:
+                if isinstance(error, OpenError) and len(wanted) == 1:  # the user is asked
+                    raise
                 unread[name] = str(error)
                 continue
             if case.name in cases:

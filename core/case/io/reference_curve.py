@@ -37,7 +37,7 @@ from .reference_samples import (
     samples_of,
 )
 from .schema import MOST_SAMPLES
-from .table import require_unit, split_head, unit_of_head
+from .table import folded, require_unit, split_head, unit_of_head
 
 MAP = "--map"
 _WRITTEN = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
@@ -101,6 +101,7 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
             (options.citation or "").strip(),
             file.name,
             sha256(file),
+            by_option=True,
             signs=convention + " (assumed: the file names none)" * assumed,
         ),
     )
@@ -444,4 +445,4 @@ def _column_of_name(name: str, by_name: Mapping[str, str], side: str) -> str:
 
 def _normal(name: str) -> str:
     """Return a name without differences in case, separators and the spelling of centre."""
-    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_").replace("centre", "center")
+    return folded(name).replace("centre", "center")

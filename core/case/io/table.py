@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeAlias
+from unicodedata import combining, normalize
 
 from ...errors import MOST_NAMED, KincheckError, brief, remedy, shortened
 from ...extras import library
@@ -183,6 +184,12 @@ def numeral(cell: Cell, sign: str = ".") -> str:
     if isinstance(cell, str):
         return cell.replace(sign, ".").replace("\u2212", "-")
     return repr(cell).removesuffix(".0")
+
+
+def folded(text: str, case: Callable[[str], str] = str.casefold) -> str:
+    """Return a text in small letters without accents, with _ between its words."""
+    apart = normalize("NFKD", case(text))
+    return re.sub(r"[\W_]+", "_", "".join(each for each in apart if not combining(each))).strip("_")
 
 
 def is_number(value: object) -> bool:

@@ -127,7 +127,6 @@ ACTION begin(LANE s) {
   sample(s, s[AT]);
   outputs(s);
   carry(s);
-  s[EARLIER] = s[HERE];
 }
 
 BETTER_ROWS

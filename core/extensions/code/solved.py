@@ -28,7 +28,6 @@ from ...kinematics.compiled.compiled_model import ASSEMBLING, CLOSED, Model, rec
 from ...kinematics.compiled.request import (
     ACCEPT,
     CONSISTENT,
-    EARLIER,
     EFFORT,
     ELEMENT,
     FORCE_SIGMA,
@@ -38,7 +37,6 @@ from ...kinematics.compiled.request import (
     REACTION,
     RESTING,
     SIGMA,
-    TIME,
     accept_by,
     slots_of,
 )
@@ -193,7 +191,7 @@ class SolvedCase:
         named = {"RESIDUAL": "residual", "CLOSURE": "closure", "BRANCH": "branch"}
         named |= {"IS_DONE": DONE, "MARGIN": MARGIN, "SIGMA": FROM + SIGMA}
         named |= {"LEFTOVER": "leftover", "LARGEST_NOW": LARGEST_SIGMA}
-        named |= {"LARGEST": FROM + LARGEST_SIGMA, "HERE": FROM + TIME, "EARLIER": EARLIER + TIME}
+        named |= {"LARGEST": FROM + LARGEST_SIGMA}
         sweep = self.case.sweep
         return {name: slots[slot] for name, slot in named.items()} | {
             "SIZE": self.size,

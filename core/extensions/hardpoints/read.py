@@ -6,12 +6,9 @@ rack move.
 
 from __future__ import annotations
 
-import json
 import math
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -19,18 +16,12 @@ from ...case.case import Case, Sweep, Truth
 from ...case.io.document import (
     explained,
     fault,
-    parse,
-    read_text,
-    require_known,
-    shown,
     unknown_name,
 )
-from ...case.io.escape import visible
 from ...case.io.readers import LEFT_OUT
 from ...case.notes import SUSPENSIONS
 from ...case.quantity import with_markers
 from ...case.units import plain
-from ...errors import MOST_NAMED, brief, shortened, similar
 from ...mechanism.mechanism import Mechanism, Vector
 from .design import (
     AxleMotion,
@@ -43,23 +34,19 @@ from .design import (
     with_axis,
     with_suspension_outputs,
 )
+from .guess import guess_of
 from .options import WheelOptions
+from .roles import fill_roles, listed, template_of
 from .rubber import of_chrono, with_file, with_rubber
 from .shims import shims
 from .suspension import Side
-from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, positions_of, unit_of, wanted_corner
+from .table import Axes, HardpointTable, axes_of, positions_of, unit_of, wanted_corner
 from .templates import (
-    NAMES,
-    TEMPLATE_NAMES,
-    TEMPLATES,
     WHEEL_CENTER,
     WHEEL_CONTACT,
-    Role,
     Template,
     agree,
-    compact,
     corner_in,
-    side_of,
 )
 
 # Inner joints of a rack near the middle may be a little beyond it. No point of a wheel's suspension
@@ -68,12 +55,6 @@ ACROSS = 0.25
 # Cars have some tens of hardpoints at a corner. A far larger table is refused, and not searched for
 # missing names.
 MOST_POINTS = 10_000
-LARGEST_NAMES = 100_000
-# Names as alike as this are taken for misspelt or abridged ones.
-LIKE = 0.75
-_SPELLINGS: Mapping[str, str] = {
-    other: word for word, others in NAMES["spellings"].items() for other in others
-}
 
 
 def case_of_hardpoints(
@@ -88,6 +69,7 @@ def case_of_hardpoints(
         followed: whether the case has its hardpoints, with what follows each row: half of the time.
 
     Raises:
+        OpenError: the table leaves facts open, and here is a guess.
         CaseError: the table lacks facts, or does not fill the roles of the template.
     """
     file = table.file
@@ -98,18 +80,13 @@ def case_of_hardpoints(
             f"found {len(table.points)} points, expected a suspension's, {MOST_POINTS} at most;"
             " take out the others",
         )
-    if not (table.unit or supplied.units or table.axes or supplied.axes):
-        raise fault(
-            file,
-            "",
-            "says neither its unit nor where x, y and z point, expected both from you; add --units"
-            f" mm or m, and --axes {AXES_IN_USE}",
-        )
-    unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
     table = _of_corner(table, supplied.corner)
-    template, of_names = _template(table, supplied)
-    named, told = _fill_roles(table, template, supplied)
+    if guess := guess_of(table, supplied, case_of_hardpoints):
+        raise guess.question()
+    template, of_names = template_of(table, supplied)
+    named, told = fill_roles(table, template, supplied)
     told = [*of_names, *told]
+    unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
     points = positions_of(table, unit, axes)
     at = {role: points[name] for role, name in named.items()}
     size = max(math.dist(a, b) for a in at.values() for b in at.values())
@@ -120,6 +97,14 @@ def case_of_hardpoints(
     if side is Side.RIGHT:  # a template describes the left side
         axes = [(k, -sign if k == 1 else sign) for k, sign in axes]
         at = {role: (x, -y, z) for role, (x, y, z) in at.items()}
+    if WHEEL_CONTACT not in named and table.wheel_radius and supplied.wheel_radius is None:
+        bare = table.wheel_radius[-1].isdigit()
+        radius = f"{table.wheel_radius}{unit.name if bare else ''}"
+        supplied = replace(supplied, wheel_radius=radius)
+        told.append(f"wheel radius {radius}, of the file")
+    if table.static_toe or table.static_camber:
+        angles = (f"{math.degrees(x):.6g} deg" for x in (table.static_toe, table.static_camber))
+        told.append("static toe {} and camber {}, of the file".format(*angles))
     vehicle = vehicle_of(table, template, named, at, supplied, side)
     travels = read_travels(file, supplied.travel, supplied.rack)
 
@@ -145,7 +130,7 @@ def case_of_hardpoints(
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
     if lacking := _missing_outputs(template, at, supplied):
         source += f"; not computed: {', '.join(lacking)}"
-    source += f"{LEFT_OUT}{_names(others)}"
+    source += f"{LEFT_OUT}{listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit.name, angle_unit="deg", assembly=(*told, *of_side))
     case = with_suspension_outputs(
@@ -248,171 +233,6 @@ def _of_corner(table: HardpointTable, said: str | None) -> HardpointTable:
     return replace(table, points=kept, left_out=left_out, side=side, corner=wanted)
 
 
-def _template(table: HardpointTable, supplied: WheelOptions) -> tuple[Template, list[str]]:
-    """Return the template that the user or the file states, or else the one whose roles the points
-    fill by their names, with a note.
-    """
-    known, said = TEMPLATE_NAMES, supplied.template
-    if said is not None and compact(said) not in known:
-        raise unknown_name(table.file, "--template", said, TEMPLATES, "a template")
-    names = ", ".join(TEMPLATES)
-    if table.template is None:
-        if said is not None:
-            return known[compact(said)], []
-        guessed = [each for each in TEMPLATES.values() if each.guessed and not supplied.ask_names]
-        fitting = [each for each in guessed if _fills(table, each)]
-        roles = max((len(each.roles) for each in fitting), default=0)
-        largest = [each for each in fitting if len(each.roles) == roles]
-        if len(largest) != 1:
-            problem = "does not say what suspension it is of, expected it from you; add --template"
-            names = " or ".join(each.name for each in largest) or f"one of {names}"
-            raise fault(table.file, "", f"{problem} {names}")
-        (found,) = largest
-        return found, [f"template {found.name}, by the names of its points: --template states it"]
-    if compact(table.template) not in known:
-        problem = (
-            f"found {shown(table.template)}, expected one of those that there is a template for;"
-            f" known: {names}"
-        )
-        raise fault(table.file, "Template", problem)
-    written = known[compact(table.template)]
-    if said is not None and known[compact(said)] is not written:
-        problem = (
-            f"found {said}, but the file is of a {table.template}, expected {written.name}; leave"
-            " out --template"
-        )
-        raise fault(table.file, "--template", problem)
-    return written, []
-
-
-def _fill_roles(
-    table: HardpointTable, template: Template, supplied: WheelOptions
-) -> tuple[dict[str, str], list[str]]:
-    """Return the name of the point for each role of the template, and notes on the names. A file of
-    names that does not exist yet is written.
-    """
-    own = supplied.names
-    new = own is not None and not own.exists()
-    named = _points_by_role(table)
-    filled = dict[str, str]()
-    if own is not None and not new:
-        roles = [role.name for role in (*template.roles, *template.optional)]
-        filled |= _read_own_names(own, roles, table.points)
-    unnamed = own if not filled and not new else None
-    for role in (*template.roles, *template.optional):
-        if role.name in filled:
-            continue
-        found = named(role)
-        if len(found) > 1:
-            places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
-            raise fault(
-                table.file,
-                role.name,
-                f"found {places}, expected one point; remove what {role.meaning} is not",
-            )
-        if found:
-            filled[role.name] = found[0]
-    missing = [role for role in template.roles if role.name not in filled]
-    unused = {compact(name): name for name in table.points if name not in filled.values()}
-    near = dict[str, str]()
-    for role in missing:
-        close = (found for each in role.names if (found := similar(each, unused, LIKE)))
-        near[role.name] = unused.get(next(close, ""), "")
-    told = list[str]()
-    distinct = len({*near.values()}) == len(near)
-    sure = distinct and all(_fits(role, name) for role, name in near.items())
-    if missing and sure and not supplied.ask_names:
-        filled |= near
-        listed = ", ".join(f"{role} is {visible(name)!r}" for role, name in near.items())
-        told.append(f"names guessed: {listed}; --names FILE states them, --ask-names refuses")
-        missing = []
-    if own is not None and new:
-        _write_names(own, template, filled)
-        told.append(f"{own}: written, with the names of the points by role")
-    if not missing:
-        return filled, told
-    lines = list[str]()
-    for role in missing:
-        name = near[role.name]
-        where = table.points[name].where if name else ""
-        place = "" if where in (name, "") else f", {where}"
-        lines.append(f"{role.name}, {role.meaning}" + f" (is it {name!r}{place}?)" * bool(name))
-    if unnamed is not None:
-        expected = f'expected lines such as {missing[0].name} = "NAME"'
-        problem = f"found no names, all lines are comments, {expected}"
-        raise fault(unnamed, "", f"{problem}; take the # away from lines that you fill in")
-    problem = f"template {template.name}: missing {'; '.join(lines)}"
-    advice = "say with --names FILE which point is which; a new FILE is written to be filled in"
-    if new:
-        advice = f"fill in {own}, which is written"
-    raise fault(
-        table.file,
-        "",
-        f"{problem}; found beside: {_names([*unused.values()])}; rename or add them, or {advice}",
-    )
-
-
-def _points_by_role(table: HardpointTable) -> Callable[[Role], list[str]]:
-    """Return what gives the points with a name of a role, or else with one and their side."""
-    by_compact_name = dict[str, list[str]]()
-    by_side_name = dict[str, list[str]]()
-    sides = [side for _, side in map(side_of, table.points)]
-    wheel = table.side or ("right" if "left" not in sides else "left")
-    for name in table.points:
-        by_compact_name.setdefault(compact(name), []).append(name)
-        plain, side = side_of(name)
-        if side == wheel:
-            by_side_name.setdefault(compact(plain), []).append(name)
-
-    def points(role: Role) -> list[str]:
-        names = dict.fromkeys(role.names)
-        found = [name for each in names for name in by_compact_name.get(each, ())]
-        return found or [name for each in names for name in by_side_name.get(each, ())]
-
-    return points
-
-
-def _fills(table: HardpointTable, template: Template) -> bool:
-    """Return whether each role of a template has one point of its own by name."""
-    named = _points_by_role(table)
-    found = [named(role) for role in template.roles]
-    return all(len(each) == 1 for each in found) and len({each[0] for each in found}) == len(found)
-
-
-def _fits(role: str, name: str) -> bool:
-    """Return whether a point's name says nothing else than a role: not lower for upper."""
-    words, others = _words(role), _words(name)
-    return bool(name) and all(
-        not (words & kind and others & kind) or words & kind == others & kind
-        for kind in map(frozenset, NAMES["opposites"].items())
-    )
-
-
-def _words(name: str) -> set[str]:
-    """Return those of the opposite words that a name has."""
-    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)
-    return {word for part in parts if (word := _SPELLINGS.get(part.lower()))}
-
-
-def _write_names(file: Path, template: Template, filled: Mapping[str, str]) -> None:
-    """Write a file of names, with a comment for each role without a point."""
-    lines = [
-        f"{role.name} = {json.dumps(filled[role.name], ensure_ascii=False)}"
-        if role.name in filled
-        else f'# {role.name} = ""  # {role.meaning}'
-        for role in (*template.roles, *template.optional)
-    ]
-    try:
-        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise fault(file, "--names", f"cannot be written ({error}); choose another file") from None
-
-
-def _names(names: Sequence[str]) -> str:
-    """Return names as text, abridged if there are more than a suspension has."""
-    return shortened([brief(visible(name)) for name in names], MOST_NAMED) or "nothing"
-
-
 def _require_one_side_and_upright(
     table: HardpointTable,
     template: Template,
@@ -451,26 +271,3 @@ def _require_one_side_and_upright(
                 f"found {written(high, 2)}, not above {named[low]} with {written(low, 2)}, expected"
                 f" it above; {advice}",
             )
-
-
-def _read_own_names(file: Path, roles: Iterable[str], points: Iterable[str]) -> Mapping[str, str]:
-    """Return the names of points by role, for the roles in a file of `role = "own name"`.
-
-    Args:
-        roles: roles of the template.
-        points: names of the points of the table.
-
-    Raises:
-        CaseError: the file cannot be read, or a role or point is unknown.
-    """
-    text = read_text(file, LARGEST_NAMES, "it holds a name for each role of a template")
-    found = dict[str, str]()
-    for role, name in parse(file, text).items():
-        require_known(file, role, role, roles, "a role")
-        if not isinstance(name, str):
-            raise fault(
-                file, role, f"found {shown(name)}, expected the name of a point; write it in quotes"
-            )
-        require_known(file, role, name, points, "a point of the table")
-        found[role] = name
-    return found

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...case.io.readers import WORKBOOKS, Reader, ReaderOptions, text_of
+from ...errors import CaseError, OpenError
 from .options import NOTHING, HardpointOptions, WheelOptions
 
 if TYPE_CHECKING:
@@ -36,7 +37,21 @@ class HardpointReader(Reader):
         """Return the case of the points of a file."""
         from .read import case_of_hardpoints
 
-        return case_of_hardpoints(self.table(file, options), options)
+        try:
+            return case_of_hardpoints(self.table(file, options), options)
+        except OpenError as error:  # of a corner or a sheet; the rest is asked with it
+            try:
+                stated: dict[str, Any] = dict(error.stated)
+                if not stated.keys() & {"corner", "sheet"}:
+                    raise
+                self.read(file, replace(options, **stated))
+            except OpenError as other:
+                if other is error:
+                    raise
+                raise error.with_others(other) from None
+            except CaseError:
+                pass
+            raise
 
 
 def is_table(file: Path, supplied: WheelOptions) -> bool:
@@ -137,7 +152,8 @@ def _workbook(file: Path, supplied: WheelOptions) -> HardpointTable:
 
 
 def _tree(file: Path, supplied: WheelOptions) -> HardpointTable:
-    from .tree import read_python, read_tree
+    from .scripts import read_python
+    from .tree import read_tree
 
     read = read_python if file.suffix.lower() == ".py" else read_tree
     return read(file, text_of(file), supplied)

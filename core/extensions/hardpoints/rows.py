@@ -10,11 +10,13 @@ mcpherson`; the unit may also stand in the head or in a row below.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from typing import TypeAlias
+from unicodedata import combining, normalize
 
 from ...case.io.document import fault, shown
 from ...case.io.table import (
@@ -31,12 +33,13 @@ from ...case.io.table import (
     trim,
 )
 from ...case.units import LENGTHS
-from ...errors import MOST_NAMED, brief, shortened
+from ...errors import MOST_NAMED, OpenError, brief, number_of, shortened
 from .options import NOTHING, WheelOptions
 from .programs import plain_lines
 from .table import (
     Hardpoint,
     HardpointTable,
+    angles_and_radius,
     incomplete,
     length_name,
     number,
@@ -45,8 +48,9 @@ from .table import (
     twice,
     wanted_corner,
 )
-from .templates import ROLES, agree, compact, corner_of, head_of_corner
-from .tree import FEWEST, axis_of, fact_of, is_assignments, read_assignments
+from .templates import ROLES, agree, compact, corner_of, head_of_corner, kind_of_head
+from .tree import FEWEST, add_fact, axis_of, is_assignments, read_assignments
+from .words import fact_of
 
 COMMENTS = ("#", "%", "//")
 HEAD = ("name", "x", "y", "z")
@@ -54,10 +58,10 @@ HEAD = ("name", "x", "y", "z")
 MOST_ROWS = 20_000
 # Further ones hold no points.
 MOST_LINES = 2 * MOST_ROWS
-_NAMES = ("name", "point", "points", "hardpoint", "hardpoints", "hardpoint_name", "point_name")
 _COLUMN = re.compile(
-    r"(?:(?:loc|coord|coordinate|pos|position)[_ ])?([xyz])"
-    r"(?:[-_ ]?(?:value|coord|coordinate|pos|position|koordinate))?"
+    r"(?:(?:loc|coord|coordinate|pos|position|coordonnee|coordinata|coordenada|koordinate|quota)"
+    r"\.?[_ ]?)?([xyz])"
+    r"(?:[-_ ]?(?:value|wert|coord|coordinate|pos|position|koordinate|坐标|轴|向|方向))?"
     r"(?:\s*[\[(_/,]\s*([a-z]+)\s*[\])]?|\s+(?:in\s+)?([a-z]+))?"
 )
 _REMARKS = ("meaning", "remark", "remarks", "comment", "comments", "note", "notes", "description")
@@ -105,11 +109,12 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
         CaseError: no head, or a row at odds with the head.
     """
     table = text_table(file, text.splitlines(), COMMENTS, _delimiter)
-    facts = dict[str, str]()
+    facts, remarks = dict[str, str](), 0
     for comment in table.comments:
         bare = comment.strip('" \t\r').lstrip("".join(COMMENTS)).rstrip(f'"{DELIMITERS}')
         if fact := fact_of(_SIGNS.sub(",", bare)):
-            facts.update([fact])
+            add_fact(file, "", facts, fact)
+        remarks += fact is None and bool(bare.strip())
     lines = [
         (f"line {k}", line)
         for k, line in enumerate(table.lines, 1)
@@ -136,7 +141,11 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
             "--sheet",
             f"found {shown(supplied.sheet)} for a table of text, expected none; leave it out",
         )
-    return read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
+    found = read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
+    if remarks:
+        said = f"{number_of(remarks, 'line')} of comments"
+        found = replace(found, left_out=[*found.left_out, said])
+    return found
 
 
 def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:
@@ -167,12 +176,19 @@ def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:
             names = ", ".join(map(shown, corners))
             problem = f"found the sheets {names}, expected one of {supplied.corner}"
             raise fault(file, "--corner", f"{problem}; correct it, or choose by --sheet NAME")
-    option = "--sheet NAME, or --corner FL" if all(corners.values()) else "--sheet NAME"
-    sheet = one_sheet(file, tables, option)
+    if len(tables) > 1:
+        names = shortened([brief(shown(each.name)) for each in tables], MOST_NAMED)
+        corner = corners[tables[0].name] if all(corners.values()) else None
+        which = ("corner", _word_of(corner)) if corner else ("sheet", tables[0].name)
+        option = shlex.join([f"--{which[0]}", which[1]])
+        why = f"{option}: the sheets {names} have tables; this is the first."
+        raise OpenError(file, [why], dict([which]), {})
+    sheet = one_sheet(file, tables, "--sheet NAME")
     found = read_rows(sheet, f"Sheet {shown(sheet.name)}:", {}, supplied)
     if found.corner is None and (corner := corners[sheet.name]):
         found = replace(found, corner=corner, side=found.side or corner[1] or None)
-    return found
+    others = [f"sheet {shown(each.name)}" for each in sheets if each.name != sheet.name]
+    return replace(found, left_out=[*found.left_out, *others])
 
 
 def _delimiter(table: Table) -> str:
@@ -206,6 +222,15 @@ def _join_words(words: Sequence[Cell]) -> Sequence[Cell]:
     return words
 
 
+def _with_names(rows: Sequence[Row]) -> Iterator[Row]:
+    """Yield rows between blanks; a head x, y, z may stand above rows that begin with names."""
+    for k, (where, cells) in enumerate(rows):
+        after = rows[k + 1][1] if k + 1 < len(rows) else ()
+        three = [_column(str(cell))[0] for cell in cells] == ["x", "y", "z"]
+        named = three and len(after) == 4 and not is_number(after[0])
+        yield where, ["name", *cells] if named else cells
+
+
 def read_rows(
     table: Table, tool: str, facts: dict[str, str], supplied: WheelOptions
 ) -> HardpointTable:
@@ -223,6 +248,7 @@ def read_rows(
     file, delimiter, rows = table.file, table.delimiter.strip(" "), [*table.rows()]
     if table.delimiter == " ":
         rows = [(where, _join_words([*filter(None, cells)])) for where, cells in rows]
+        rows = [*_with_names(rows)]
     if (parts := _parts(file, rows)) is None:
         where, cells = rows[0]
         raise fault(
@@ -235,7 +261,7 @@ def read_rows(
     left_out = list[str]()
     for where, cells in above:
         if fact := fact_of(_row_text([cell for cell in cells if cell != ""])):
-            facts.setdefault(*fact)
+            add_fact(file, where, facts, fact)
         else:
             left_out.append(_note(where, cells))
     unit = head.unit
@@ -262,11 +288,18 @@ def read_rows(
     chosen, body, others = _of_one_corner(file, head, body, supplied.corner)
     left_out += others
     found = list[tuple[str, str, Sequence[Cell]]]()
-    for where, cells in body:
-        own = [cells[k] if k < len(cells) else "" for k in head.columns]
+    rows_of = [[cells[k] if k < len(cells) else "" for k in head.columns] for _, cells in body]
+    unnamed = bool(rows_of) and all(own[0] == "" for own in rows_of)
+    for n, ((where, cells), own) in enumerate(zip(body, rows_of, strict=True), 1):
+        if unnamed and "" not in own[1:]:
+            found.append((where, f"P{n}", own[1:]))
+            continue
         role = isinstance(own[0], str) and compact(own[0]) in ROLES
         if "" in own[1:] and not role:
-            left_out.append(_note(where, cells))
+            if stated := fact_of(_row_text([cell for cell in cells if cell != ""])):
+                facts.setdefault(*stated)
+            else:
+                left_out.append(_note(where, cells))
         else:
             _require_complete(file, where, cells, head, delimiter)
             found.append((where, _row_text(own[:1]), own[1:]))
@@ -278,11 +311,20 @@ def read_rows(
     of_corners = head.of_corners if chosen else []
     columns = [name for k, name in enumerate(head.names) if k not in of_corners]
     left_out += [f"column {brief(name)}" for name in head.others if name in columns]
+    headless = {
+        k
+        for _, cells in body
+        for k in range(len(head.names), len(cells))
+        if cells[k] != "" and k not in head.columns
+    }
+    left_out += [f"column {k + 1}, which has no head" for k in sorted(headless)]
     return HardpointTable(
         *(file, tool, points, unit or facts.get("unit")),
         *(facts.get("axes"), facts.get("template"), left_out),
         side=facts.get("side") or (chosen or ("", ""))[1] or None,
         corner=chosen,
+        texts=[*table.comments, *left_out, *head.names, table.name],
+        **angles_and_radius(facts),
     )
 
 
@@ -309,15 +351,23 @@ def _of_one_corner(
     chosen = [each for each in names if wanted is None or agree(each, wanted)]
     if len(chosen) != 1:
         listed = shortened([" ".join(filter(None, each)) for each in names], MOST_NAMED)
-        where, expected, advice = head.where, "those of one corner", "choose it by --corner FL"
-        if said is not None:
-            where, expected, advice = "--corner", said, "choose one of them"
-        raise fault(file, where, f"found points of {listed}, expected {expected}; {advice}")
+        if said is None:
+            word = _word_of(next(iter(names)))
+            why = f"--corner {word}: the table has points of {listed}; this is the first."
+            raise OpenError(file, [why], {"corner": word}, {})
+        problem = f"found points of {listed}, expected {said}; choose one of them"
+        raise fault(file, "--corner", problem)
     kept = [row for row, corner in zip(body, corners, strict=True) if corner == chosen[0]]
     others = [
         f"{corners.count(each)} rows of {' '.join(each)}" for each in names if each != chosen[0]
     ]
     return chosen[0], kept, others
+
+
+def _word_of(corner: tuple[str, str]) -> str:
+    """Return the option of a corner: FL, RR, front or left."""
+    axle, side = corner
+    return f"{axle[0]}{side[0]}".upper() if axle and side else axle or side
 
 
 def _points(
@@ -404,8 +454,10 @@ def _as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
     if sum(text.lower() == "x" for text in texts) > 2:  # a column of the coordinates' names
         return None
     for k, text in enumerate(texts):
-        column, unit = _column(text.lower())
+        column, unit = _column(text)
         if column not in HEAD:
+            continue
+        if column == "name" and column in columns:  # a name and what it means
             continue
         if column in columns:
             raise fault(
@@ -420,6 +472,8 @@ def _as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
         return None
     if "name" not in columns:  # the only column before the coordinates, under any name, or beside
         before = [k for k in range(min(columns.values())) if not head_of_corner(texts[k])]
+        if len(before) > 1:
+            before = [k for k in before if kind_of_head(texts[k]) != "number"]
         if len(before) != 1:
             before = [k for k in range(4) if k not in columns.values()]
             if before[0] != 3 or any(texts[3:]):  # below no name, at the end
@@ -437,9 +491,10 @@ def _as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
 
 def _column(text: str) -> tuple[str, str | None]:
     """Return the column and the unit of a name in the head; empty for a further column."""
-    if text in _NAMES or text.replace(" ", "_") in _NAMES:
+    if kind_of_head(text) == "name":
         return "name", None
-    if (found := _COLUMN.fullmatch(text)) is None:
+    plain = "".join(each for each in normalize("NFKD", text.lower()) if not combining(each))
+    if (found := _COLUMN.fullmatch(plain)) is None:
         return "", None
     axis, unit, bare = found.groups()
     if bare is not None and length_name(bare) not in LENGTHS:
@@ -451,12 +506,14 @@ def _by_coordinate(file: Path, rows: Sequence[Row]) -> _Parts | None:
     """Return the points of rows with one coordinate each."""
     points = dict[str, dict[str, tuple[str, Cell]]]()
     units = dict[str, str]()
-    others = list[Row]()
+    others, remarks = list[Row](), list[Row]()
     for where, cells in rows:
         if (coordinate := _coordinate(cells)) is None:
             others.append((where, cells))
             continue
-        name, axis, values, unit = coordinate
+        name, axis, values, unit, more = coordinate
+        if more:
+            remarks.append((where, more))
         if len(values) > 1:
             raise fault(
                 file,
@@ -485,11 +542,13 @@ def _by_coordinate(file: Path, rows: Sequence[Row]) -> _Parts | None:
             raise incomplete(file, next(iter(place.values()))[0], name, place)
         else:
             others += [(where, [f"{name} {axis}"]) for axis, (where, _) in place.items()]
-    return Head("the head", range(4), HEAD, unit), others, body
+    return Head("the head", range(4), HEAD, unit), [*others, *remarks], body
 
 
-def _coordinate(cells: Sequence[Cell]) -> tuple[str, str, list[Cell], str] | None:
-    """Return name, axis, numbers and unit of a row of a coordinate; None for another row."""
+def _coordinate(cells: Sequence[Cell]) -> tuple[str, str, list[Cell], str, list[Cell]] | None:
+    """Return name, axis, numbers, unit and further cells of a row of a coordinate; None for another
+    row.
+    """
     filled = [cell for cell in cells if cell != ""]
     if len(filled) < 2 or not isinstance(filled[0], str) or is_number(filled[0]):
         return None
@@ -502,9 +561,10 @@ def _coordinate(cells: Sequence[Cell]) -> tuple[str, str, list[Cell], str] | Non
     values = [cell for cell in rest if is_number(cell)]
     if split is None or not values or not is_number(rest[0]):
         return None
-    after = rest[len(values)] if len(rest) > len(values) else unit
-    unit = after.strip("[]() ") if isinstance(after, str) else ""
-    return (*split, values, unit if length_name(unit) in LENGTHS else "")
+    more = rest[len(values) :]
+    if more and isinstance(more[0], str) and length_name(more[0].strip("[]() ")) in LENGTHS:
+        unit, more = more[0].strip("[]() "), more[1:]
+    return (*split, values, unit if length_name(unit) in LENGTHS else "", more)
 
 
 def _by_point(file: Path, rows: Sequence[Row]) -> _Parts | None:
@@ -521,12 +581,11 @@ def _by_point(file: Path, rows: Sequence[Row]) -> _Parts | None:
         elif len(filled) == 4 and numbers == [0, 1, 2]:
             body.append((where, [filled[3], *filled[:3]]))
         elif len(filled) == len(numbers) == 3:
-            raise fault(
-                file,
-                where,
-                f"found {shown(', '.join(map(str, filled)))}, three numbers without a name,"
-                " expected the name of the point too; write name,x,y,z in each row",
-            )
+            body.append((where, [f"P{len(body) + 1}", *filled]))
+        elif len(filled) == len(numbers) == 4 and str(filled[0]).split(".")[0] == str(
+            len(body) + 1
+        ):
+            body.append((where, [f"P{len(body) + 1}", *filled[1:]]))
         else:
             return None
     if len(body) < FEWEST:

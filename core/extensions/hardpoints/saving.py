@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import math
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -108,6 +109,7 @@ def _reads_back(
             (
                 *(unit_of(each, given.units).size, axes_of(each, given.axes), each.side),
                 *(each.template or given.template, each.static_toe, each.static_camber),
+                each.wheel_radius,
             )
             for each, given in ((found, said), (table, supplied))
         ]
@@ -190,6 +192,9 @@ def new_text(
         "units": unit_of(table, supplied.units).name,
         "axes": table.axes or supplied.axes,
         "side": table.side,
+        "wheel_radius": table.wheel_radius,
+        "static_toe": table.static_toe and f"{math.degrees(table.static_toe)!r} deg",
+        "static_camber": table.static_camber and f"{math.degrees(table.static_camber)!r} deg",
     }
     text = StringIO()
     text.write("".join(f"# {key}: {value}\n" for key, value in known.items() if value))

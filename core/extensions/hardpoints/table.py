@@ -52,6 +52,7 @@ _ADVICE: Sequence[tuple[re.Pattern[str], str]] = (
 """Remedies for invalid coordinates."""
 
 
+STATIC_ANGLES = ("static_toe", "static_camber")
 Axes: TypeAlias = Sequence[tuple[int, float]]
 """Axis of the case, 0 to 2, and sign of x, y and z of a table."""
 
@@ -78,6 +79,10 @@ class HardpointTable:
         left_out: other content, without use for kinematics or a template.
         side: side of the wheel, if the file states it.
         corner: axle and side of the points, if the file tells those of several wheels apart.
+        wheel_radius: radius of the loaded wheel, if the file gives it, as "310mm"; without a unit
+            in that of the coordinates.
+        texts: titles, comments and other texts, for guesses.
+        roles: names of points by role, if they are known otherwise than by the names.
         beside: what sections of the file have beside points, if a reader uses it.
     """
 
@@ -92,7 +97,18 @@ class HardpointTable:
     static_camber: float = 0.0
     side: str | None = None
     corner: tuple[str, str] | None = None
+    wheel_radius: str | None = None
+    texts: Sequence[str] = ()
+    roles: Mapping[str, str] = field(default_factory=dict[str, str])
     beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Any])
+
+
+def angles_and_radius(facts: Mapping[str, str]) -> dict[str, Any]:
+    """Return the wheel's angles at design [rad] and its radius among the facts of a file, by the
+    names of a table's attributes.
+    """
+    angles = {key: math.radians(float(facts.get(key, 0.0))) for key in STATIC_ANGLES}
+    return {**angles, "wheel_radius": facts.get("wheel_radius")}
 
 
 def wanted_corner(file: Path, said: str) -> tuple[str, str]:

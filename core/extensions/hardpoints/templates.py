@@ -17,6 +17,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from ...case.io.table import folded
 from ...errors import CaseError, unknown
 from ...joints import Distance, Joint
 from ...mechanism.mechanism import Point, Vector
@@ -131,12 +132,7 @@ def normal(name: str) -> str:
     """Return a hardpoint's name in normal form: without differences in case, blanks, the prefix of
     Adams/Car, and the spelling of centre.
     """
-    plain = (
-        re.sub(r"[^a-z0-9]+", "_", name.lower())
-        .strip("_")
-        .replace("centre", "center")
-        .replace("tie_rod", "tierod")
-    )
+    plain = folded(name).replace("centre", "center").replace("tie_rod", "tierod")
     return re.sub(r"^hp[ls]_", "", plain)
 
 
@@ -164,6 +160,12 @@ def head_of_corner(column: str) -> str:
     """Return what a column of corners tells, by its head: "corner", "axle" or "side"; an empty text
     of any other column.
     """
+    found = kind_of_head(column)
+    return found if found in ("corner", "axle", "side") else ""
+
+
+def kind_of_head(column: str) -> str:
+    """Return what a column has, by its head: as `head_of_corner`, or "name" or "number"."""
     word = compact(column)
     return next((what for what, words in NAMES["heads"].items() if word in words), "")
 

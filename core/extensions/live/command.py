@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import webbrowser
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -20,6 +21,7 @@ from ...report.progress import complain
 if TYPE_CHECKING:
     from ...case.case import Case
     from ...harness.record import Record, Results
+    from .naming import NamingServer
     from .server import Judge, Live, LiveServer
 
 
@@ -32,6 +34,9 @@ class Serve(Command):
     The one line printed is its address, with a token that it asks for. Numbers go to new files
     only. Ctrl-C ends it, with status 130; status 2 means that the file cannot be read or the port
     cannot be used.
+
+    A table whose names do not tell which point is which has a page of its own first: its points in
+    3D with proposed roles, and a button that saves them as a file of names.
     """
 
     about = "edit a suspension or move a mechanism in a browser"
@@ -82,25 +87,63 @@ class Serve(Command):
         Raises:
             KincheckError: the file cannot be read, or a library is missing.
         """
-        return self._server(registry, self._reader(registry), framed=True)
+        return self._server(registry, self._reader(registry, self.supplied), framed=True)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         if not self.reference and self.curve.without_curve:
             raise KincheckError(self.curve.without_curve)
-        wanted, read = self.measure or 0, self._reader(registry)
+        naming = None if self.measure or self.save else self._naming(registry)
+        if naming is None:
+            return self._serve(registry, self.supplied)
+        try:
+            print(naming.address, flush=True)
+            if not self.no_browser:
+                webbrowser.open(naming.address)
+            naming.saved.wait()
+            said: Any = replace(naming.guess.taken, names=naming.file)
+            stated = [*naming.guess.question().options[:-1], str(naming.file)]
+            complain([f"{naming.file} is written. Next time, add: {shlex.join(stated)}"])
+            return self._serve(registry, said, naming.follow)
+        finally:
+            naming.close()
+
+    def _naming(self, registry: Registry) -> NamingServer | None:
+        """Return the server of the page that names points; None unless a table needs it."""
+        from ..hardpoints.reader import is_table
+        from .naming import NamingServer, naming_of
+
+        file = self._file
+        typed = isinstance(self.case, str | Path) and str(self.case) not in registry.cases()
+        if not (typed and file.is_file() and is_table(file, self.supplied)):
+            return None
+        guess = naming_of(file, self.supplied)
+        return NamingServer(guess, self.port) if guess else None
+
+    def _serve(
+        self, registry: Registry, supplied: Supplied, tell: Callable[[str], object] | None = None
+    ) -> int:
+        """Serve the page until it ends.
+
+        Args:
+            tell: takes another page to the address.
+        """
+        wanted, read = self.measure or 0, self._reader(registry, supplied)
         if self.save:
             return self._write_page(read())
         if wanted:
             _measure_edits(read(), wanted)
             if self.no_browser:
                 return Status.WITHIN
-        how = {"port": self.port, "once": self.once, "measuring": wanted > 0}
+        port = 0 if tell else self.port  # the other page has it still
+        how = {"port": port, "once": self.once, "measuring": wanted > 0}
         server = self._server(registry, read, **how)
         try:
             address = server.address + f"&measure={wanted}" * bool(wanted)
             print(address, flush=True)
-            if not self.no_browser and not webbrowser.open(address) and wanted:
+            if tell:
+                tell(address)
+            elif not self.no_browser and not webbrowser.open(address) and wanted:
                 raise KincheckError(
                     "--measure: no browser is found; give --no-browser, or set BROWSER"
                 )
@@ -139,7 +182,7 @@ class Serve(Command):
     def _file(self) -> Path:
         return Path(self.case if isinstance(self.case, str | Path) else self.case.name)
 
-    def _reader(self, registry: Registry) -> Callable[[], Live]:
+    def _reader(self, registry: Registry, supplied: Supplied) -> Callable[[], Live]:
         """Return the function that opens a table of hardpoints, or any other mechanism."""
         from ..hardpoints.reader import is_table
         from .model import LiveModel
@@ -159,11 +202,11 @@ class Serve(Command):
         def read() -> Live:
             case, file, vary = self.case, self._file, self.variation
             typed = isinstance(case, str | Path) and str(case) not in registry.cases()
-            if typed and file.is_file() and is_table(file, self.supplied):
-                return LiveTable(file, self.supplied, with_reference, Path(vary) if vary else None)
+            if typed and file.is_file() and is_table(file, supplied):
+                return LiveTable(file, supplied, with_reference, Path(vary) if vary else None)
             if vary:
                 raise KincheckError(f"--vary: {file} is no table of hardpoints; give one")
-            return LiveModel(file, with_reference(registry.find_case(case, self.supplied)))
+            return LiveModel(file, with_reference(registry.find_case(case, supplied)))
 
         return read
 

@@ -446,7 +446,7 @@ def test_several_corners_need_corner_option(tmp_path):
     lines += [",".join([each, *row]) for each in CORNERS for row in points_at("mcpherson", each)]
     file = written(tmp_path, lines)
     with pytest.raises(
-        CaseError, match=r"front left, front right, rear left, rear right.*--corner"
+        CaseError, match=r"--corner FL: .* front left, front right, rear left, rear right"
     ):
         load(file, of("mcpherson"))
     with pytest.raises(CaseError, match="expected left; choose"):

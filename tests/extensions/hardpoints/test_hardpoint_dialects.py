@@ -327,9 +327,9 @@ def test_missing_points_advise_names_option(tmp_path, capsys):
     file.write_text(table(points={OWN[name]: at for name, at in POINTS.items()}))
     options = ["--template", "double_wishbone", "--units", "mm", "--axes", "adams"]
     assert main(["run", str(file), "--engine", "native", *options]) == 2
-    assert "--names FILE" in capsys.readouterr().err
-    names = tmp_path / "names.toml"
-    names.write_text("\n".join(f'{role} = "{name}"' for role, name in OWN.items()))
+    assert f"--names {tmp_path / 'car_names.toml'}" in capsys.readouterr().err
+    names = tmp_path / "car_names.toml"
+    assert all(f'{role} = "{name}"' in names.read_text() for role, name in OWN.items())
     options += ["--names", str(names)]
     assert main(["run", str(file), "--engine", "native", *options]) == 2
     assert "left out: nothing" in capsys.readouterr().err
@@ -431,7 +431,8 @@ wheel_center | hub
     ),
 )
 def test_names_of_other_points_are_refused(tmp_path, role, name):
-    with pytest.raises(CaseError, match=f"missing {role}"):
+    """Places may tell such a point: the user is asked."""
+    with pytest.raises(CaseError, match=f"missing {role}|{role} is {name}"):
         read(
             tmp_path,
             table(points={name if each == role else each: POINTS[each] for each in POINTS}),
@@ -454,6 +455,7 @@ def test_names_file_is_written_when_missing(tmp_path, plain):
     assert again.mechanism == plain
     assert not again.assembly
     names.unlink()
+    own = {OWN[name]: (0.0, 0.0, 0.0) for name in POINTS}  # no suspension
     with pytest.raises(CaseError, match=r"fill in .*names\.toml"):
-        read(tmp_path, table(points={OWN[name]: at for name, at in POINTS.items()}), said)
+        read(tmp_path, table(points=own), said)
     assert '# uca_front = ""' in names.read_text()

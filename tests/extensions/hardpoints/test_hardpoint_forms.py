@@ -207,7 +207,7 @@ no z | car.csv | rows | wheel_center_z,228.25\\n | | wheel_center without z
 twice | car.csv | rows | | lca_front_x,1\\n | lca_front x: given before, in line 1
 two units | car.csv | rows and units | 228.25;mm | 228.25;m
     | line 27 ... 'm', and 'mm' above ... one unit
-no names | car.csv | | | -89.75,-259.75,285.25\\n0,1,2 | line 1 ... three numbers without a name
+two points | car.csv | | | -89.75,-259.75,285.25\\n0,1,2 | line 1 ... expected the head
 four numbers | car.csv | | | uca_front,1,2,3,4\\nuca_rear,1,2,3,4 | line 1 ... expected the head
 two heads | car.csv | table | uca_rear | name,x,y,z\\nuca_rear | line 3 ... a second head
 twice in a script | car.m | script | | lca_front = [1, 2, 3];\\n | given before, in line 1

@@ -259,13 +259,13 @@ def test_adams_truncated_hardpoints_are_refused(tmp_path):
 
 
 TABLE_FAULTS = """
-no unit | | | units= | --units mm or --units m
-no axes | | | axes= | where x, y and z point ... --axes forward,left,up
+no unit | | | units= | --units mm: ... from the middle ... Add: --units mm
+no axes | | | axes= | is the outermost ... Add: --axes rearward,right,up
 no template | | | template= ask_names=yes
     | --template ... mcpherson, double_wishbone,  ... five_link, three_link
 no template, and names that fit none | uca_outer | my_point | template=
-    | --template ... mcpherson, double_wishbone,  ... five_link, three_link
-neither unit nor axes | | | units= axes= | --units mm or m ... --axes forward,left
+    | --template double_wishbone ... uca_outer is my_point ... Add: --template double_wishbone --n
+neither unit nor axes | | | units= axes= | Add: --units mm --axes rearward,right,up
 misspelt template | | | template=duoble_wishbone
     | --template ... 'duoble_wishbone' ... 'double_wishbone'
 wrong template | | | template=mcpherson | template mcpherson: missing strut_lower ... uca_front
@@ -320,8 +320,7 @@ def test_template_follows_from_point_names(tmp_path, name, capsys):
     file = tmp_path / "car.csv"
     file.write_text("\n".join(["# units: m", "# axes: forward,left,up", "name,x,y,z", *rows]))
     if name.startswith("pushrod"):
-        three = "pushrod_lower_arm or pushrod_upper_arm or pushrod_knuckle"
-        complains(file, f"add --template {three}", Supplied())
+        complains(file, f"--template {name} ... Doubtful: it may be a pushrod_", Supplied())
         return
     said = [note for note in load(file, Supplied()).assembly if "--template" in note]
     wanted = name.removeprefix("reduced_")

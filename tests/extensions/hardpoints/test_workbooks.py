@@ -114,7 +114,9 @@ def test_workbook_formulas_are_read_by_value(tmp_path, plain):
 def test_sheet_option_chooses_hardpoints(tmp_path, plain, capsys):
     rear = [HEAD, *([name, x, 2 * y, z] for name, (x, y, z) in POINTS.items())]
     file = book(tmp_path, {"Front axle": ROWS, "Rear axle": rear, "Notes": [["x"]]})
-    complains(file, "on the sheets 'Front axle', 'Rear axle',  ... --sheet NAME", SAID)
+    complains(
+        file, "the sheets 'Front axle', 'Rear axle' have tables ... Add: --sheet 'Front axle'", SAID
+    )
     options = ["--template", "double_wishbone", "--units", "mm", "--axes", "adams"]
     assert load(file, replace(SAID, sheet="Front axle")).mechanism == plain
     assert main(["explain", str(file), *options, "--sheet", "Front"]) == 2
