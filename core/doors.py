@@ -1,4 +1,4 @@
-"""Doors: what an extension offers to kincheck, and the extensions that are there.
+"""Doors: the offers of extensions to kincheck, and the extensions at hand.
 
 An extension is a folder of `core/extensions` or `adapters`, or an installed package of someone
 else, with one `EXTENSION = Extension(__name__, ...)`. The kernel asks here and imports no extension
@@ -30,29 +30,29 @@ _Table = Mapping[str, str]
 
 @dataclass(frozen=True)
 class Extension:
-    """What an extension offers. A value "module:name" is an object in a module of its folder, which
+    """Offers of an extension. A value "module:name" is an object in a module of its folder, which
     is imported on use.
 
     Attributes:
         package: `__name__` of the folder; its last part is the extension's name.
-        needs: names of the extensions that it imports; without one of them it is not there.
+        needs: names of the extensions it imports; without one of them it is off.
         commands: class of each command of the command line; see `cli.parser.Command`.
         public: object of each name in the package kincheck.
-        schemas: type, or function that returns the JSON Schema, of each kind of file.
-        keys: docstring whose part behind "Reference. " lists the keys of a kind of file.
-        completions: names that a shell offers as values of each option.
+        schemas: type, or function for the JSON Schema, of each kind of file.
+        keys: docstring with the keys of a kind of file behind "Reference. ".
+        completions: names to complete as values of each option.
         engines: class of each engine in projection mode.
-        equilibria: function that returns the equilibria of a case by an engine, for engines
+        equilibria: function for the equilibria of a case by an engine, for engines
             "native" and "projection"; see `harness.engine.Balancing`.
-        simulations: function without arguments that returns each engine in simulate mode.
+        simulations: function without arguments for each engine in simulate mode.
         readers: readers of files; see `case.io.readers.Reader`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
-        sources: options added to commands that run engines; see `cli.engine_source.EngineSource`.
-        writers: function that writes a mechanism in each format; see `case.io.model_writer`.
-        codes: function that returns the files of a solved case in a language, by their names.
+        sources: options added to commands with engines; see `cli.engine_source.EngineSource`.
+        writers: function to write a mechanism in each format; see `case.io.model_writer`.
+        codes: function for the files of a solved case in a language, by their names.
         formats: who reads each format, for the help.
-        converters: function from a model's file to the text that a simulator saves.
+        converters: function from a model's file to the text saved by a simulator.
         views: HTML of a result or a mechanism in a notebook.
         styles: formulation of a mechanism in each row style; see `kinematics.formulation.styles`.
         steppers: script of each stepper of free motion; see `adapters.steppers.scripts`.

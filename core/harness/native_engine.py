@@ -88,7 +88,7 @@ class NativeEngine:
 
     def equilibria(self, case: Case) -> Trajectory:
         """Return the equilibria of a case; see `engine.Balancing`."""
-        return equilibria_of(self, case, "native")
+        return equilibria_of(self, case, STANDARD)
 
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
         """Solve all samples in order; tol is relative to the mechanism's size."""
