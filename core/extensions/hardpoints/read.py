@@ -66,7 +66,7 @@ def case_of_hardpoints(
     points of the knuckle.
 
     Args:
-        followed: whether the case has its hardpoints, with what follows each row: half of the time.
+        followed: whether the case has its hardpoints, with the moves by each row: half of the time.
 
     Raises:
         OpenError: the table leaves facts open, and here is a guess.

@@ -155,7 +155,7 @@ def _design(live: LiveTable, case: Case) -> dict[str, Any]:
 
 
 def _leaves(part: Any, at: Leaf = ()) -> Iterator[tuple[Leaf, float]]:
-    """Yield the floating-point numbers of a part of a scene, and where they are."""
+    """Yield the floating-point numbers of a part of a scene, with their places in it."""
     if isinstance(part, float):
         yield at, part
     elif isinstance(part, dict):

@@ -63,7 +63,7 @@ VARIANTS = 512
 
 
 class LiveFile:
-    """A file that is open.
+    """An open file.
 
     Attributes:
         axis: of the sweep, as in reports.
@@ -75,7 +75,7 @@ class LiveFile:
     axis: Axis
 
     def opening_of(self, engines: Sequence[str], **own: Any) -> Opening:
-        """Return what the openings of all files tell, and what this one does."""
+        """Return the opening, with the facts of this kind of file."""
         own = {"unit": self.case.length_unit, **own}
         return Opening(
             kind=self.kind,
@@ -149,8 +149,8 @@ class LiveTable(LiveFile):
         """Return the case of the table with other numbers, by the reader's own rules.
 
         Args:
-            followed: whether what follows each row is found anew; it is the same for all numbers,
-                and takes half of the time.
+            followed: whether the moves by each row are found anew; they are the same for all
+                numbers, and take half of the time.
 
         Raises:
             KincheckError: there are more or fewer points, or the reader refuses them.
@@ -202,7 +202,7 @@ class LiveTable(LiveFile):
         )
 
     def read(self, asked: Read) -> Invalid:
-        """Return what the reader says to a text typed for a coordinate.
+        """Return the answer of the reader to a text typed for a coordinate.
 
         Raises:
             KincheckError: the text is no number.
@@ -424,8 +424,8 @@ def structure_of(case: Case) -> list[Any]:
 
 
 def _equation(output: Any) -> Any:
-    """Return an output without what an edit changes beside places: its tolerance, and a radius that
-    is that of a point.
+    """Return an output without the numbers an edit changes beside places: its tolerance, and the
+    radius of a point.
     """
     kept = dict[str, Any]()
     for each in fields(output):
