@@ -111,13 +111,13 @@ void {n}_set(void *state, int which, double value) {{
 """
 
 
-def files(case: Case, places: Sequence[str]) -> Mapping[str, bytes]:
+def files(case: Case, places: Sequence[str], *, forces: bool = False) -> Mapping[str, bytes]:
     """Return the bytess of NAME.c and NAME.h, by the names of the files.
 
     Raises:
         KincheckError: the case has a part that the code cannot have.
     """
-    solved = solved_case(case, places)
+    solved = solved_case(case, places, forces=forces)
     name = identifier(case.name)
     return {
         f"{name}.c": source(solved, name).encode(),

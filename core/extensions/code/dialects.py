@@ -346,6 +346,11 @@ def _kept(each: CodeOutput) -> Iterator[str]:
 def _told(k: int, each: CodeOutput) -> Iterator[str]:
     """Yield the lines that write the three orders of an output at rate r."""
     factors = ("", "r * ", "r * r * ")
+    if each.quantity.forces:
+        parts = [f"{factor!r} * f[{slot}]" for slot, factor in each.pushed.items()]
+        yield f"out[{3 * k}] = f[SIGMA_NOW] > FIRM ? {' + '.join(parts) or '0.0'} : NOTHING;"
+        yield from (f"out[{3 * k + j}] = NOTHING;" for j in (1, 2))
+        return
     if each.completion:
         # Euler parameters go on with their sign; a rotation vector is of half a turn at most
         first, turned = each.slots[0], each.quantity.unit != "1"
@@ -417,6 +422,15 @@ def steps_text(solved: SolvedCase) -> str:
         parts.append(_function("ACTION move_geometry(LANE s, WHOLE which, NUMBER change)", moved))
     own = ["VALUE x;"] if any(line.startswith("x =") for line in told) else []
     own += ["SCRATCH(c, 12);"] if any(each.completion for each in solved.outputs) else []
+    if any(each.quantity.forces for each in solved.outputs):
+        # forces are no powers of the rate: a lane at this rate has them
+        own += [f"SCRATCH(f, {solved.size});", "copy(f, s);"]
+        for slots, *_ in solved.drives():
+            own += [
+                f"f[{slots[1]}] = r * f[{slots[1]}];",
+                f"f[{slots[2]}] = r * r * f[{slots[2]}];",
+            ]
+        own.append("outputs(f);")
     parts += [steps, _function("ACTION tell(FROM s, LANE out, NUMBER r)", [*own, *told])]
     return "\n\n".join(parts)
 

@@ -221,13 +221,16 @@ LACKS3(SetUInt16) LACKS3(SetUInt32) LACKS3(SetUInt64) LACKS3(SetUInt8)
 """
 
 
-def files(case: Case, places: Sequence[str], fmi: int = 2) -> Mapping[str, bytes]:
+def files(
+    case: Case, places: Sequence[str], fmi: int = 2, *, forces: bool = False
+) -> Mapping[str, bytes]:
     """Return the bytes of NAME.fmu, by the name of the file.
 
     Raises:
         KincheckError: the case has a part that the code cannot have, or the compiler fails.
     """
-    solved, name = solved_case(case, places), identifier(case.name)
+    solved = solved_case(case, places, forces=forces)
+    name = identifier(case.name)
     token = "{" + sha256(source(solved, name).encode()).hexdigest()[:32] + "}"
     sources = {
         f"{name}.c": source(solved, name),

@@ -52,6 +52,7 @@ class Mechanism {{
   stand() {{{stand}}}
 }}
 """
+EXPORT = "export { Mechanism, Mechanism as default };\n"
 STAND = """
     const s = this.lanes[0];
     copy(s, START);
@@ -61,13 +62,16 @@ STAND = """
   """
 
 
-def files(case: Case, places: Sequence[str]) -> Mapping[str, bytes]:
+def files(case: Case, places: Sequence[str], *, forces: bool = False) -> Mapping[str, bytes]:
     """Return the bytes of NAME.mjs, by the name of the file.
 
     Raises:
         KincheckError: the case has a part that the code cannot have.
     """
-    text = source(solved_case(case, places)) + "export { Mechanism, Mechanism as default };\n"
+    text = (
+        source(solved_case(case, places, forces=forces))
+        + "export { Mechanism, Mechanism as default };\n"
+    )
     return {f"{identifier(case.name)}.mjs": text.encode()}
 
 

@@ -8,7 +8,7 @@ lane holds the slots of the programs, then the numbers of `Tail`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,17 +17,24 @@ from ...algebra import Scalar
 from ...case.case import TIME as SWEPT_TIME
 from ...case.case import Case, Quantity
 from ...case.designs import DesignOutputs
-from ...case.measures import Orientation
+from ...case.measures import ForceMeasure, Orientation
 from ...errors import KincheckError, shortened
+from ...forces import Forces, Reaction
+from ...harness.compare import output_series
 from ...jet import Jet, arctan2, sqrt
 from ...joints.base import Kind
+from ...kinematics import NativeSolver
 from ...kinematics.compiled.compiled_model import ASSEMBLING, CLOSED, Model, recent_model
 from ...kinematics.compiled.request import (
     ACCEPT,
     CONSISTENT,
+    EFFORT,
+    ELEMENT,
+    FORCE_SIGMA,
     FROM,
     LARGEST_SIGMA,
     OUTPUT,
+    REACTION,
     RESTING,
     SIGMA,
     accept_by,
@@ -63,6 +70,7 @@ class CodeOutput:
         at_design: value of such an angle at the design position.
         kept: first number behind the slots that remembers its turns or its sign.
         completion: program of an attitude, from four Euler parameters and their rates.
+        pushed: of a force, the sum that it is: slots of forces, and a factor of each.
     """
 
     quantity: Quantity
@@ -72,6 +80,7 @@ class CodeOutput:
     at_design: float = 0.0
     kept: int = 0
     completion: Program | None = None
+    pushed: Mapping[int, float] = field(default_factory=dict[int, float])
 
 
 @dataclass(frozen=True)
@@ -194,6 +203,8 @@ class SolvedCase:
             "TOLERANCE": plan.tolerance,
             "ASSEMBLING": ASSEMBLING,
             "CLOSED": CLOSED,
+            "SIGMA_NOW": self.model.vectors.get(FORCE_SIGMA, [slots[SIGMA]])[0],
+            "FIRM": 0.0 if self.model.forces is None else self.model.forces.least,
             "CARRIED": len(plan.carried),
             "POSE": len(self.state),
             "STAYING": len(self.standing),
@@ -226,12 +237,15 @@ class SolvedCase:
         return found
 
 
-def solved_case(case: Case, places: Sequence[str], bodies: Sequence[str] = ()) -> SolvedCase:
+def solved_case(
+    case: Case, places: Sequence[str], bodies: Sequence[str] = (), *, forces: bool = False
+) -> SolvedCase:
     """Return a case ready to be written as code.
 
     Args:
         places: names of the parameters, see `kincheck.curves`.
         bodies: names of those whose poses are wanted.
+        forces: whether the code has the outputs of forces.
 
     Raises:
         KincheckError: the case has a part that the code cannot have, or a place is unknown.
@@ -244,12 +258,12 @@ def solved_case(case: Case, places: Sequence[str], bodies: Sequence[str] = ()) -
                 f"{case.name}: the driver {name} follows a {type(plain).__name__.lower()}, which"
                 " code cannot have. Give it a table, a ramp or a sine, or sweep it."
             )
-    measured = tuple(each for each in case.outputs if not each.forces)
+    measured = tuple(each for each in case.outputs if forces or not each.forces)
     if not measured:
         left = shortened([each.name for each in case.outputs], 5)
         raise KincheckError(
-            f"{case.name}: all outputs are forces ({left}), which the code cannot have. Add an"
-            " output of the motion."
+            f"{case.name}: all outputs are forces ({left}), which the code has only if asked for."
+            " Give --forces, or add an output of the motion."
         )
     case = replace(case, outputs=measured)
     varied, moves, units = list[str](), np.empty((0, 0)), dict[str, str]()
@@ -267,9 +281,15 @@ def solved_case(case: Case, places: Sequence[str], bodies: Sequence[str] = ()) -
     for k, (name, unit) in enumerate(units.items()):
         moved = {model.geometry[i]: float(x) for i, x in enumerate(moves[:, k]) if x}
         parameters.append(Parameter(name, unit, _nominal(geometry, name), moved))
+    pushes = _pushes(case, model) if case.forces else {}
     outputs: list[CodeOutput] = []
     for each in measured:
-        outputs.append(found := _output(model, each, kept))
+        found = (
+            CodeOutput(each, (), pushed=pushes[each.name])
+            if each.forces
+            else _output(model, each, kept)
+        )
+        outputs.append(found)
         kept += 4 if found.completion else 1 if found.period else 0
     poses = {
         name: [slot for part in "rp" for slot in model.plan.kept[model.rows[f"{part} {name}"]]]
@@ -280,6 +300,57 @@ def solved_case(case: Case, places: Sequence[str], bodies: Sequence[str] = ()) -
         for rows in _other_rows(case, model)
     ]
     return SolvedCase(case, model, outputs, parameters, route.begin.time, poses, others)
+
+
+def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:
+    """Return by output of a force the slots that it is a sum of, with the factor of each.
+
+    Raises:
+        KincheckError: forces cannot be traced, or redundant rows leave one undetermined.
+    """
+    wanted, rows = model.request.forces, model.rows
+    if wanted is None:
+        raise KincheckError(
+            f"{case.name}: the forces of this mechanism are none that code can have. Leave --forces"
+            " out."
+        )
+    if model.selection.dropped:
+        solver = NativeSolver()
+        found = solver.prepare(case.mechanism, case.sweep.path, case.points, (), case.forces)(TOL)
+        loose = [
+            each.name
+            for each in case.outputs
+            if each.forces
+            and np.isnan(output_series(case, each, found).position[found.solved]).any()
+        ]
+        if loose:
+            raise KincheckError(
+                f"{case.name}: redundant rows leave {shortened(loose, 5)} undetermined, as"
+                " kincheck run tells. Leave these outputs out, or --forces."
+            )
+    names = [f"{REACTION}{each}" for each in wanted.joints]
+    names += [f"{EFFORT}{each}" for each in wanted.drivers]
+    names += [f"{ELEMENT}{each}" for each in wanted.elements]
+    slots, columns = list[int](), dict[str, slice]()
+    for name in names:  # without what redundant rows leave free
+        own = model.plan.kept[rows[name]][: 6 if name.startswith(REACTION) else 1]
+        columns[name] = slice(len(slots), len(slots) + len(own))
+        slots += own
+    units = np.eye(len(slots))  # one force after the other is one, and all others are zero
+    wrenches = {name: units[:, columns[f"{REACTION}{name}"]] for name in wanted.joints}
+    none, zero = np.zeros((len(slots), 6, 0)), np.zeros(len(slots))
+    ones = Forces(
+        {name: Reaction(each[:, :3], each[:, 3:], none) for name, each in wrenches.items()},
+        {name: units[:, columns[f"{EFFORT}{name}"].start] for name in wanted.drivers},
+        {name: units[:, columns[f"{ELEMENT}{name}"].start] for name in wanted.elements},
+        zero,
+        zero,
+    )
+    return {
+        each.name: {slot: float(x) for slot, x in zip(slots, each.values(ones), strict=True) if x}
+        for each in case.outputs
+        if isinstance(each, ForceMeasure)
+    }
 
 
 def _other_rows(case: Case, model: Model) -> list[tuple[int, ...]]:

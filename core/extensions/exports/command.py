@@ -20,6 +20,7 @@ from ...options import (
     number_with_unit,
     option,
     options,
+    switch,
 )
 from ...report.progress import complain
 
@@ -66,6 +67,7 @@ class Export(OfCase):
         several="together",
     )
     fmi: str | None = option("version of the FMU; default 2", metavar="VERSION", choices=("2", "3"))
+    forces: bool = switch("outputs of forces in the code, too")
     at: str | None = option(
         "value of the swept driver at the start, such as 30mm or -20deg, in SI without a unit;"
         " default: the design position",
@@ -80,7 +82,7 @@ class Export(OfCase):
 
         if (code := offers("codes").get(self.to)) is not None:
             return self._write_code(code, registry)
-        if found := names_of_given(self, ("vary", "fmi")):
+        if found := names_of_given(self, ("vary", "forces", "fmi")):
             raise KincheckError(f"{found}: only code takes it. Leave it out, or add --to c.")
         writer = writer_of(self.to)
         case = registry.case_of(self, driven=False)
@@ -96,7 +98,7 @@ class Export(OfCase):
             raise KincheckError("--fmi: only an FMU has a version. Add --to fmu, or leave it out.")
         case = registry.case_of(self)
         version = {"fmi": int(self.fmi)} if self.fmi else {}
-        contents = code.load()(case, self.vary, **version)
+        contents = code.load()(case, self.vary, forces=self.forces, **version)
         folder = self.out or Path()
         folder.mkdir(parents=True, exist_ok=True)
         files = {folder / name: content for name, content in contents.items()}
@@ -107,8 +109,9 @@ class Export(OfCase):
             print(file)
         refuse(problems)
         left = [each.name for each in case.outputs if each.forces]
-        if left:
-            complain([f"{case.name}: the code has no forces: {shortened(left, MOST_NAMED)}"])
+        if left and not self.forces:
+            named = shortened(left, MOST_NAMED)
+            complain([f"{case.name}: the code has no forces, which --forces adds: {named}"])
         return Status.WITHIN
 
 

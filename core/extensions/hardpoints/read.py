@@ -57,11 +57,16 @@ ACROSS = 0.25
 MOST_POINTS = 10_000
 
 
-def case_of_hardpoints(table: HardpointTable, supplied: WheelOptions) -> Case:
+def case_of_hardpoints(
+    table: HardpointTable, supplied: WheelOptions, *, followed: bool = True
+) -> Case:
     """Return the case of a suspension; it is consensus_only.
 
     Its outputs are all suspension outputs defined by its points, and the coordinates of three
     points of the knuckle.
+
+    Args:
+        followed: whether the case has its hardpoints, with the moves by each row: half of the time.
 
     Raises:
         OpenError: the table leaves facts open, and here is a guess.
@@ -131,11 +136,13 @@ def case_of_hardpoints(table: HardpointTable, supplied: WheelOptions) -> Case:
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
-    turned, unsteered = shims(template, at, vehicle.static_toe, vehicle.static_camber)
-    hardpoints = hardpoints_of(
-        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned, unsteered
-    )
-    case, sides = replace(case, hardpoints=hardpoints), sides_of(supplied.axle, side)
+    if followed:
+        turned, unsteered = shims(template, at, vehicle.static_toe, vehicle.static_camber)
+        hardpoints = hardpoints_of(
+            named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned, unsteered
+        )
+        case = replace(case, hardpoints=hardpoints)
+    sides = sides_of(supplied.axle, side)
     rubber, left_out = of_chrono(table, template, named)
     case = replace(case, assembly=(*case.assembly, *left_out))
     with explained(file, "", unit):

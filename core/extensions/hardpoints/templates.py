@@ -13,6 +13,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ KNUCKLE = "knuckle"
 WHEEL_CENTER, WHEEL_CONTACT, WHEEL_AXIS = "wheel_center", "wheel_contact", "wheel_axis"
 TIEROD_INNER = "tierod_inner"
 
+SPELLINGS = 4096
+"""Names whose normal form is kept: an edited table has the same ones."""
 _SIDES = (
     re.compile(r"(?P<name>.+?)_(?P<side>left|right|l|r|fl|fr|rl|rr)"),
     re.compile(r"(?P<side>left|right|fl|fr|rl|rr)_(?P<name>.+)"),
@@ -124,6 +127,7 @@ class Template:
         ]
 
 
+@lru_cache(SPELLINGS)
 def normal(name: str) -> str:
     """Return a hardpoint's name in normal form: without differences in case, blanks, the prefix of
     Adams/Car, and the spelling of centre.
@@ -132,6 +136,7 @@ def normal(name: str) -> str:
     return re.sub(r"^hp[ls]_", "", plain)
 
 
+@lru_cache(SPELLINGS)
 def compact(name: str) -> str:
     """Return a hardpoint's name in normal form without separators, also of words written together:
     `upperBallJoint`.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import msgspec
 import numpy as np
@@ -155,10 +155,12 @@ def _design(live: LiveTable, case: Case) -> dict[str, Any]:
 
 
 def _leaves(part: Any, at: Leaf = ()) -> Iterator[tuple[Leaf, float]]:
-    """Yield the floating-point numbers of a part of a scene, and where they are."""
+    """Yield the floating-point numbers of a part of a scene, with their places in it."""
     if isinstance(part, float):
         yield at, part
-    elif isinstance(part, dict | list | tuple):
-        items = part.items() if isinstance(part, dict) else enumerate(part)
-        for key, each in items:
+    elif isinstance(part, dict):
+        for key, each in cast("dict[str, Any]", part).items():
             yield from _leaves(each, (*at, key))
+    elif isinstance(part, list | tuple):
+        for k, each in enumerate(cast("Sequence[Any]", part)):
+            yield from _leaves(each, (*at, k))

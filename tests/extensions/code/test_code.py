@@ -82,10 +82,10 @@ def way(case):
     yield from (k for k in np.argsort(-times) if times[k] < 0.0)
 
 
-def native(case):
+def native(case, *, forces=False):
     """Return the same numbers by native; NaN where it has none."""
     (record,) = kincheck.run(case, "native").records
-    measured = [each.name for each in case.outputs if not each.forces]
+    measured = [each.name for each in case.outputs if forces or not each.forces]
     found = np.full((len(case.sweep.values), len(measured), 3), np.nan)
     for j, name in enumerate(measured):
         for order, motion in enumerate(MOTIONS):
@@ -95,14 +95,15 @@ def native(case):
     return found
 
 
-def truth(case):
+def truth(case, *, forces=False):
     """Return what the code is compared with: native, or the closed form where that loses digits."""
-    if case.name not in FINER:
-        return native(case)
-    by_output = [case.reference[each.name] for each in case.outputs if not each.forces]
-    return np.array(
-        [[getattr(each, motion) for motion in MOTIONS] for each in by_output]
-    ).transpose(2, 0, 1)
+    found = native(case, forces=forces)
+    if case.name in FINER:
+        for j, each in enumerate(each for each in case.outputs if forces or not each.forces):
+            if not each.forces:
+                known = case.reference[each.name]
+                found[:, j] = np.transpose([getattr(known, motion) for motion in MOTIONS])
+    return found
 
 
 def assert_equal(found, expected):
@@ -126,8 +127,8 @@ def test_c_of_case_equals_native(name, tmp_path):
 @pytest.mark.parametrize("name", cases.names())
 def test_javascript_of_every_case(name, tmp_path):
     case = kincheck.load(name)
-    write(tmp_path, js.files(case, ()))
-    assert_equal(javascript(tmp_path, name, case), truth(case))
+    write(tmp_path, js.files(case, (), forces=True))
+    assert_equal(javascript(tmp_path, name, case), truth(case, forces=True))
 
 
 @pytest.mark.nightly
@@ -138,8 +139,9 @@ def test_c_of_every_case(name, compiler, level, tmp_path):
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler}")
     case = kincheck.load(name)
-    write(tmp_path, c.files(case, ()))
-    assert_equal(solve(library(tmp_path, name, level, compiler=compiler), case), truth(case))
+    write(tmp_path, c.files(case, (), forces=True))
+    found = solve(library(tmp_path, name, level, compiler=compiler), case)
+    assert_equal(found, truth(case, forces=True))
 
 
 def javascript(folder, name, case):
@@ -323,6 +325,29 @@ def test_export_of_code_is_refused(argv, said, tmp_path, monkeypatch, capsys):
     assert [*tmp_path.iterdir()] == []
 
 
+@compiled
+@pytest.mark.parametrize("rate", [0.0, 1.0, -3.0])
+@pytest.mark.parametrize("name", ["mcpherson_strut_loaded", "planar_slider_crank"])
+def test_forces_equal_native(name, rate, tmp_path):
+    """At any rate of the driver: at rest, too."""
+    case = kincheck.load(name)
+    case = replace(case, sweep=replace(case.sweep, rate=rate))
+    assert any(each.forces for each in case.outputs)
+    write(tmp_path, c.files(case, (), forces=True))
+    assert_equal(solve(library(tmp_path, name, "-O1"), case), native(case, forces=True))
+
+
+def test_code_of_loose_force_is_refused(tmp_path):
+    """Four hinges of a plane: nothing tells which of them holds the links in it."""
+    text = (Path(cases.__file__).parent / "four_bar.toml").read_text("utf-8")
+    text = text.partition("[reference]")[0].replace("closed_form", "consensus_only", 1)
+    text += '[outputs.loose]\ntype = "joint_force"\njoint = "coupler_pin"\ncomponent = "y"\n'
+    (tmp_path / "four_bar.toml").write_text(text)
+    case = kincheck.load(tmp_path / "four_bar.toml")
+    with pytest.raises(KincheckError, match="redundant rows leave loose undetermined"):
+        c.files(case, (), forces=True)
+
+
 def test_code_of_forces_alone_is_refused():
     case = kincheck.load("mcpherson_strut_loaded")
     forces = tuple(each for each in case.outputs if each.forces)
@@ -335,7 +360,7 @@ def test_code_leaves_forces_out(tmp_path, monkeypatch, capsys):
     assert main(["export", "mcpherson_strut_loaded", "--to", "js", "--out", "code"]) == 0
     said = capsys.readouterr()
     assert said.out == "code/mcpherson_strut_loaded.mjs\n"
-    assert "the code has no forces" in said.err
+    assert "the code has no forces, which --forces adds" in said.err
 
 
 def driven_by(motion, folder):

@@ -68,7 +68,7 @@ def test_ends_of_two_hundred_cranks(crank):
 
 def loop_case(family, seed, folder):
     loop = closed_chain(random_loop(family, seed))
-    file, _ = written("case", loop, folder, np.random.default_rng(seed), 12, f"{family}{seed}")
+    file, _ = written("case", loop, folder, np.random.default_rng(seed), None, f"{family}{seed}")
     return kincheck.load(file, kincheck.Supplied(closure=1e-9))
 
 

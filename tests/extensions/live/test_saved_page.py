@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
+import json
+import shutil
+import subprocess
 
 import kincheck
 import numpy as np
 import pytest
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+from kincheck.core.extensions.live.protocol import Solve
+from kincheck.core.extensions.live.saved import saved_page
+from kincheck.core.extensions.live.table import LiveTable
 
 from ...support.browser import CHROMIUM, Browser
 from .conftest import CAR
@@ -189,3 +196,69 @@ def test_page_is_not_saved(argv, said, car, monkeypatch, capsys):
     assert main(["serve", *argv.split()]) == 2
     assert said in capsys.readouterr().err
     assert not car.with_name("p.html").exists()
+
+
+ANSWERS = """
+import { readFileSync } from "fs";
+const page = readFileSync("page.html", "utf8");
+const script = page.slice(page.indexOf("<script>") + 8, page.lastIndexOf("</script>"));
+const asked = JSON.parse(readFileSync("asked.json", "utf8"));
+const part = (from, to) => script.slice(script.indexOf(from), script.indexOf(to));
+const parts = [
+  part("const SAVED", '"use strict"'), // and the solver
+  script.match(/^const direction = .*$/m)[0],
+  part("const MOST_FRAMES", "function linkTo"),
+];
+const link = (0, eval)(`${parts.join("\\n")}; answererOf`);
+const told = [];
+const send = link((message) => told.push(message));
+for (const points of asked) await send({ type: "solve", points, whole: true });
+console.log(JSON.stringify(told.filter(({ type }) => type === "answer")));
+"""
+
+
+def assert_answers_as_server(template, folder, **supplied):
+    """Compare with the answers of the server, to whom the reader says where all points go."""
+    table = folder / "car.csv"
+    table.write_text(sample_table(TEMPLATES[template]), "utf-8")
+    live = LiveTable(table, kincheck.Supplied(travel="0.02:9", **supplied))
+    page = saved_page(live)
+    assert len(page.encode()) < LARGEST
+    (folder / "page.html").write_text(page, "utf-8")
+    rng = np.random.default_rng(1)
+    edits = [(np.array(live.positions) + rng.uniform(-2, 2, (len(live.names), 3))).tolist()
+             for _ in range(2)]  # fmt: skip
+    (folder / "asked.json").write_text(json.dumps(edits))
+    (folder / "ask.mjs").write_text(ANSWERS)
+    said = subprocess.run(["node", "ask.mjs"], cwd=folder, capture_output=True, check=True)
+    for points, found in zip(edits, json.loads(said.stdout), strict=True):
+        expected = live.solve(Solve(points=[tuple(row) for row in points]))
+        assert found["solved"] == expected.solved
+        assert found["frames"] == expected.frames
+        for name, values in expected.outputs.items():
+            pair = (np.array(each, dtype=float) for each in (found["outputs"][name], values))
+            np.testing.assert_allclose(*pair, rtol=CLOSE, atol=10.0 * CLOSE, err_msg=name)
+        seen, drawn = found["drawing"], expected.drawing
+        np.testing.assert_allclose(seen["nodes"], drawn["nodes"], atol=1e-9)
+        assert (seen["steps"], seen["start"]) == (drawn["steps"], drawn["start"])
+        for one, other in zip(seen["bodies"], drawn["bodies"], strict=True):
+            for key in "rp":
+                np.testing.assert_allclose(one[key], other[key], atol=1e-9)
+
+
+in_node = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
+
+
+@in_node
+def test_saved_page_answers_as_server(tmp_path):
+    assert_answers_as_server("pushrod_upper_arm", tmp_path, axle="roll")
+
+
+@in_node
+@pytest.mark.nightly
+@pytest.mark.parametrize("template", TEMPLATES)
+@pytest.mark.parametrize("axle", [None, "heave", "roll", "steer"])
+def test_saved_pages_of_all_templates(template, axle, tmp_path):
+    if axle == "steer" and "tierod_inner" not in {each.name for each in TEMPLATES[template].roles}:
+        pytest.skip(f"{template} is not steered")
+    assert_answers_as_server(template, tmp_path, axle=axle)
