@@ -340,6 +340,16 @@ def test_slip_in_recording_is_named(judged, table, options, change, text):
     assert text in record["message"]
 
 
+@pytest.mark.parametrize("said", ["rocker-90 [deg]", "-rocker+90.0 [rad]"])
+def test_slip_names_option_that_states_it(judged, said):
+    """A wrong sign and a wrong unit of an output; with the option the recording is right."""
+    options = [*RIGHT[:3], f"JOINT_4.angle={said}"]
+    status, record = judged(DATA / "fourbar_angles.csv", *options)
+    (stated,) = re.findall(r'If it is meant, say --map "([^"]*)"', record["message"])
+    assert status == 1
+    assert judged(DATA / "fourbar_angles.csv", *RIGHT[:2], "--map", stated)[0] == 0
+
+
 def test_map_offset_has_a_unit(judged):
     options = ["--map", "MOTION_1=crank-0.8726646259971648 [rad]", *RIGHT[2:]]
     assert judged(DATA / "fourbar_angles.csv", *options)[0] == 0
