@@ -42,6 +42,8 @@ class Extension:
         keys: docstring whose part behind "Reference. " lists the keys of a kind of file.
         completions: names that a shell offers as values of each option.
         engines: class of each engine in projection mode.
+        equilibria: function that returns the equilibria of a case by an engine, for engines
+            "native" and "projection"; see `harness.engine.Balancing`.
         simulations: function without arguments that returns each engine in simulate mode.
         readers: readers of files; see `case.io.readers.Reader`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
@@ -52,6 +54,7 @@ class Extension:
         formats: who reads each format, for the help.
         converters: function from a model's file to the text that a simulator saves.
         views: HTML of a result or a mechanism in a notebook.
+        styles: formulation of a mechanism in each row style; see `kinematics.formulation.styles`.
         steppers: script of each stepper of free motion; see `adapters.steppers.scripts`.
     """
 
@@ -63,6 +66,7 @@ class Extension:
     keys: _Table = field(default_factory=dict[str, str])
     completions: _Table = field(default_factory=dict[str, str])
     engines: _Table = field(default_factory=dict[str, str])
+    equilibria: _Table = field(default_factory=dict[str, str])
     simulations: _Table = field(default_factory=dict[str, str])
     readers: _Table = field(default_factory=dict[str, str])
     methods: _Table = field(default_factory=dict[str, str])
@@ -73,6 +77,7 @@ class Extension:
     formats: _Table = field(default_factory=dict[str, str])
     converters: _Table = field(default_factory=dict[str, str])
     views: _Table = field(default_factory=dict[str, str])
+    styles: _Table = field(default_factory=dict[str, str])
     steppers: _Table = field(default_factory=dict[str, str])
 
     @property

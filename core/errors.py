@@ -165,11 +165,13 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
 def remedy(name: str, known: Iterable[str]) -> str:
     """Return the remedy for an unknown name: the most similar known one, else all of them."""
     names = sorted(known)
+    if not names:
+        return "there is none here: define it, or leave it out"
     close = similar(name, names)
     return (
         f"did you mean {close!r}?"
         if close
-        else f"known: {shortened([*map(brief, names)], MOST_NAMED) or 'none'}"
+        else f"known: {shortened([*map(brief, names)], MOST_NAMED)}"
     )
 
 

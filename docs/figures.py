@@ -55,6 +55,7 @@ def FIGURES() -> dict[str, str | bytes]:  # noqa: N802
             },
             "figures/strut-errors.svg": strut_errors(),
             "examples/report.html": example_report(),
+            "examples/live.html": example_live(),
             "figures/car-scene.svg": scene(car, "car", frames=(0, 16, 32)),
             "figures/car-curves.svg": car_curves(car),
             "figures/car-envelope.svg": car_envelope(),
@@ -72,6 +73,15 @@ def _files(page: str) -> Any:
         main(["templates", "mcpherson"])
     case = kincheck.load("car.csv", kincheck.Supplied(travel="0.08:33"))
     return kincheck.run(case, "native")
+
+
+def example_live() -> str:
+    """Return the live page of a double wishbone, with its solver in it."""
+    with open("wishbone.csv", "w") as table, contextlib.redirect_stdout(table):
+        main(["templates", "double_wishbone"])
+    page = Path("live.html")
+    assert main(["serve", "wishbone.csv", "--travel", "0.06:61", "--save", str(page)]) == 0
+    return page.read_text("utf-8")
 
 
 def svg(figure: Figure) -> str:

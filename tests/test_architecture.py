@@ -37,7 +37,7 @@ IMPORTS = {
     ".": "",
     "__init__": ". case case/io harness joints kinematics mechanism studies/checks",
     "case": ". joints kinematics mechanism primitives",
-    "case/io": ". case joints kinematics mechanism",
+    "case/io": ". case joints mechanism",
     "case/models": ". case case/io",
     "cli": (
         ". case case/io case/models harness harness/workers history joints kinematics "
@@ -51,7 +51,7 @@ IMPORTS = {
     "kincheck": ". __init__ case case/io cli harness primitives report",
     "kinematics": (
         ". kinematics/assembly kinematics/compiled kinematics/continuation "
-        "kinematics/forces kinematics/formulation kinematics/statics kinematics/structure "
+        "kinematics/forces kinematics/formulation kinematics/structure "
         "mechanism primitives program"
     ),
     "kinematics/assembly": ". kinematics/compiled kinematics/formulation mechanism primitives",
@@ -64,10 +64,6 @@ IMPORTS = {
     ),
     "kinematics/forces": ". joints kinematics/formulation mechanism primitives program",
     "kinematics/formulation": ". joints mechanism primitives program",
-    "kinematics/statics": (
-        ". joints kinematics/compiled kinematics/forces kinematics/formulation "
-        "kinematics/structure mechanism primitives program program/llvm"
-    ),
     "kinematics/structure": ". joints kinematics/formulation mechanism primitives",
     "mechanism": ". joints",
     "primitives": ". program",
@@ -122,6 +118,7 @@ def imports_against_the_table(path, syntax):
             yield f"imports {where}"
         elif (
             here == target[0] == "adapters"
+            and not mine
             and len(path.parts) > 2
             and target[1] not in (path.parts[1], "shared")
         ):

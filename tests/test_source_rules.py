@@ -13,7 +13,7 @@ from .support.sources import DOOR, SOURCES, TESTS, imported, module_of, tree
 SIMULATORS = {"mujoco", "pinocchio", "exudyn", "opensim", "pydrake", "dartpy"}
 
 
-NUMERICS = {"assemblies", "blocks", "code", "explain", "free", "laboratory", "proofs"}
+NUMERICS = {"assemblies", "blocks", "code", "explain", "free", "laboratory", "proofs", "statics"}
 """Extensions that walk or prove the equations in another way, and see the inside of kinematics."""
 
 

@@ -2,4 +2,9 @@
 
 from ...core.doors import Extension
 
-EXTENSION = Extension(__name__, engines={"dart": "dart:Dart"}, simulations={"dart": "dart:Steps"})
+EXTENSION = Extension(
+    __name__,
+    needs=["simulate"],
+    engines={"dart": "dart:Dart"},
+    simulations={"dart": "dart:Steps"},
+)

@@ -19,10 +19,10 @@ from ...core.case.case import Case
 from ...core.joints import Spherical
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.simulation import SteppedTree, Stepping, Tie
 from ..shared.tree_forces import NO_MASS, Mass, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Link
+from ..simulate.simulation import SteppedTree, Stepping, Tie
 
 # DART puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])

@@ -5,5 +5,8 @@ mode.
 from ...core.doors import Extension
 
 EXTENSION = Extension(
-    __name__, engines={"drake": "drake:Drake"}, simulations={"drake": "drake:Steps"}
+    __name__,
+    needs=["simulate"],
+    engines={"drake": "drake:Drake"},
+    simulations={"drake": "drake:Steps"},
 )

@@ -25,10 +25,10 @@ from ...core.case.case import Case
 from ...core.joints import Fixed, Spherical
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.simulation import SimulationEndedError, SteppedTree, Stepping, Tie
 from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Chain, Link, Relation
+from ..simulate.simulation import SimulationEndedError, SteppedTree, Stepping, Tie
 
 # Drake puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])

@@ -1,1 +1,1 @@
-"""Exudyn: projection mode with its constraint rows, and simulate mode with its own solvers."""
+"""Exudyn: projection mode with its constraint rows."""

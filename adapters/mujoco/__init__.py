@@ -1,3 +1,1 @@
-"""MuJoCo: projection mode with its kinematics and Jacobians, and simulate mode with its time
-stepping.
-"""
+"""MuJoCo: projection mode with its kinematics and Jacobians."""

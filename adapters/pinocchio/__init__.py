@@ -1,3 +1,1 @@
-"""Pinocchio: projection mode with its kinematics and Jacobians, and simulate mode with its
-constrained dynamics.
-"""
+"""Pinocchio: projection mode with its kinematics and Jacobians."""

@@ -13,21 +13,19 @@ from __future__ import annotations
 import importlib
 import timeit
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.errors import SolveError, UnsupportedError
-from ...core.forces import Forces
-from ...core.harness.engine import Floor
+from ...core.errors import SolveError
+from ...core.harness.engine import Floor, equilibria_of
 from ...core.joints import Joint
 from ...core.mechanism.mechanism import replaced_joints, with_equivalents
 from ...core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate
 from ...core.trajectory import Trajectory
-from .equilibrium import Rest, Walk, equilibria
 from .equivalents import in_own_frame, own_frame
 from .projection import EFFORTS, solve_by_projection
 from .projection_model import ProjectionModel
@@ -169,14 +167,7 @@ class ProjectionEngine(ABC):
 
     def equilibria(self, case: Case) -> Trajectory:
         """Return the equilibria of a case; see `harness.engine.Balancing`."""
-
-        def solve(case: Case, group: Sequence[int]) -> tuple[Mapping[int, Rest], Forces, str]:
-            model = self.build(case)
-            if not case.forces:
-                raise UnsupportedError(f"{self.title} gives no forces of case {case.name!r}")
-            return Walk(model, self.with_known_joints(case)).solve(group)
-
-        return equilibria(case, solve)
+        return equilibria_of(self, case, "projection")
 
     def efforts(self) -> Mapping[str, Self]:
         """Return the efforts by the number of Newton steps."""

@@ -5,5 +5,8 @@ and simulate mode with its assembler.
 from ...core.doors import Extension
 
 EXTENSION = Extension(
-    __name__, engines={"simbody": "simbody:Simbody"}, simulations={"simbody": "assembly:Assembly"}
+    __name__,
+    needs=["simulate"],
+    engines={"simbody": "simbody:Simbody"},
+    simulations={"simbody": "assembly:Assembly"},
 )

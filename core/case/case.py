@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,56 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..caches import cache_last
 from ..errors import CaseError, unknown
 from ..kinematics import places
-from ..mechanism.mechanism import Mechanism, extent
+from ..mechanism.mechanism import Mechanism, Point, extent
 from ..mechanism.motions import Absolute, Motion, Path, Ramp, Slowed
 from ..trajectory import Array
 from .quantity import MARKER as MARKER
 from .quantity import ORDERS as ORDERS
 from .quantity import Output as Output
 from .quantity import Quantity
-
-
-class Load(StrEnum):
-    """A load of a wheel; see `studies.compliance.rig`."""
-
-    LONGITUDINAL = "longitudinal"
-    LATERAL = "lateral"
-    BRAKING = "braking"
-    ALIGNING = "aligning"
-
-
-@dataclass(frozen=True)
-class Resting:
-    """The table [equilibrium].
-
-    Attributes:
-        held: drivers with values; all others are free.
-    """
-
-    held: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Rig:
-    """The table [compliance]; None follows from the other tables.
-
-    Attributes:
-        wheel: the wheel's carrier.
-        contact: point of the wheel's contact with the road.
-        held: drivers with values; all others are free.
-        loads: loads whose slopes are wanted.
-        tire_stiffness: vertical [N/m], for the ride rate.
-    """
-
-    wheel: str | None = None
-    contact: str | None = None
-    held: tuple[str, ...] | None = None
-    loads: tuple[Load, ...] = tuple(Load)
-    tire_stiffness: float | None = None
-
-
-if TYPE_CHECKING:
-    from ..kinematics import LoadPoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,21 +149,6 @@ class Sweep:
         return {self.driver: self.values, **further}
 
 
-@dataclass(frozen=True)
-class Free:
-    """The start and the samples of a free motion, without drivers.
-
-    Attributes:
-        duration: of the motion from the design position [s].
-        samples: number of samples, both ends included.
-        rates: at the start by driver or joint [m/s or rad/s]; see `kinematics.free_motion`.
-    """
-
-    duration: float
-    samples: int
-    rates: Mapping[str, float] = field(default_factory=dict[str, float])
-
-
 @dataclass(frozen=True, eq=False)
 class Series:
     """One output over the samples: value [unit], and time derivatives if known, each of shape (n,).
@@ -236,6 +178,7 @@ class Origin:
         file: name of the file of the reference; empty without a file.
         sha256: digest of that file.
         own: whether kincheck computed the reference.
+        by_option: whether --reference gave it, and not [reference] of a case file.
         units: units of its columns, by name: the driver, then outputs.
         signs: sign convention of its outputs; empty if only the case's own axes apply.
         grid: places of its values, if not the samples of the sweep.
@@ -246,6 +189,7 @@ class Origin:
     file: str = ""
     sha256: str = ""
     own: bool = False
+    by_option: bool = False
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     signs: str = ""
     grid: str = ""
@@ -272,11 +216,11 @@ class Balance:
     """Samples that are equilibria: the drivers of the case hold, all other motions are free.
 
     Attributes:
-        places: of further loads.
+        places: points of further loads.
         loads: force and torque at each place by its name [N, N m], shape (n, 6).
     """
 
-    places: tuple[LoadPoint, ...] = ()
+    places: tuple[Point, ...] = ()
     loads: Mapping[str, Array] = field(default_factory=dict[str, Array])
 
 
@@ -292,10 +236,9 @@ class Case:
         assembly: notes on how the start was closed, and on rows left out.
         closure: of rows left out; None if all rows hold.
         hardpoints: rows of the table of hardpoints that the case is of; empty for another file.
-        rig: of compliance studies, if the case has one.
         wheels: each `Vehicle` of [suspension], whether outputs read it or not.
         unforced: drivers without a force, which only follow a recording.
-        free: its free motion; None for the default.
+        tables: what tables of extensions say beyond that, by key; see `io.sections`.
         balance: None unless its samples are equilibria.
         ranges: of joints of a model with a lower and an upper limit, by joint and freedom, from
             the model's zero [m or rad].
@@ -315,10 +258,9 @@ class Case:
     assembly: tuple[str, ...] = ()
     closure: Closure | None = None
     hardpoints: tuple[Hardpoint, ...] = ()
-    rig: Rig | None = None
     wheels: tuple[Any, ...] = ()
     unforced: tuple[str, ...] = ()
-    free: Free | None = None
+    tables: Mapping[str, Any] = field(default_factory=dict[str, Any])
     balance: Balance | None = None
     ranges: Mapping[tuple[str, str], tuple[float, float]] = field(
         default_factory=dict[tuple[str, str], tuple[float, float]]

@@ -63,10 +63,12 @@ def _reference_notes(case: Case) -> Iterator[str]:
             " is called validated"
         )
     elif not origin.citation:
+        source = '"author, title, page or address"'
+        where = origin.file if origin.by_option else "[reference]"
+        add = f"--citation {source}" if origin.by_option else f"citation = {source} to [reference]"
         yield (
-            f"judged against an uncited reference: truth is {case.truth}, and [reference] does not"
-            " say where it comes from, so that no pass is called validated; add citation ="
-            ' "author, title, page or address" to [reference]'
+            f"judged against an uncited reference: truth is {case.truth}, and {where} does not say"
+            f" where it comes from, so that no pass is called validated; add {add}"
         )
 
 

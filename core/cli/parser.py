@@ -173,7 +173,7 @@ def add_command(commands: Any, name: str, cls: type[Command], given: Collection[
     parser.set_defaults(do=partial(_run, cls), one_thread=cls.one_thread)
     known = add_options(parser, cls, given)
     if cls.below:
-        below = parser.add_subparsers(title="benchmarks", metavar="BENCHMARK")
+        below = parser.add_subparsers(title="commands", metavar="COMMAND")
         for each, other in cls.below.items():
             add_command(below, each, other, known)
 

@@ -25,7 +25,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -37,9 +38,9 @@ from ..case.quantity import point_jets, still_jets
 from ..case.turns import output_over_sweep
 from ..errors import CaseError, number_of
 from ..trajectory import PER_TIME, QUANTITIES, Array, Trajectory
-from ..unit_text import motion_word, value_text
+from ..unit_text import motion_word
 from . import labels
-from .record import Deviation, Deviations, OutputSeries
+from .record import Deviation, Deviations, Facts, OutputSeries
 
 NO_VALUE = "has no value at"
 """Phrase of a reason: the standard has no value at some samples, so they are not judged."""
@@ -221,6 +222,7 @@ class Curve:
         values: shape (n,), NaN at unknown samples.
         unit: of the values.
         half: half-width of the interval around each value, shape (n,); None for exact values.
+        facts: of its case, for the units of texts.
     """
 
     values: Array
@@ -228,6 +230,11 @@ class Curve:
     rtol: float = 0.0
     unit: str = ""
     half: Array | None = None
+    facts: Facts = field(default_factory=dict[str, Any])
+
+    def text(self, value: float, form: str = ".3g") -> str:
+        """Return a value, or a difference of values, with its unit."""
+        return labels.shown_text(value, self.unit, self.facts, form)
 
     def changed(self, change: Callable[[Array], Array]) -> Curve:
         """Return the curve after an affine change of its values and samples."""
@@ -294,19 +301,25 @@ def describe(
     driver: str,
     values: Sequence[float],
     unit: str = "m",
+    facts: Facts | None = None,
 ) -> str:
     """Return one line with the deviation and its sample, or the note that values are missing.
 
     Args:
         unit: unit of the output.
+        facts: of the case: the units of its table, and its driver.
     """
+    facts = facts or {}
     word, standard = motion_word(quantity, unit), labels.against(worst.against)
     if worst.max_abs <= worst.tolerance:
         return f"{output}: {word} has no value at samples where {standard} has one"
     unit += PER_TIME[QUANTITIES.index(quantity)]
-    off, tolerance = (value_text(f"{size:.3g}", unit) for size in (worst.max_abs, worst.tolerance))
+    off, tolerance = (
+        labels.shown_text(size, unit, facts, ".3g") for size in (worst.max_abs, worst.tolerance)
+    )
+    driven = labels.driver_unit(facts) if facts.get("units") else ""
+    place = labels.shown_text(values[worst.worst_step], driven, facts, ".9g")
     return (
-        f"{output}: {word} is off by {off} at sample {worst.worst_step}"
-        f" ({driver} = {values[worst.worst_step]:.9g}), tolerance {tolerance},"
-        f" against {standard}"
+        f"{output}: {word} is off by {off} at sample {worst.worst_step} ({driver} = {place}),"
+        f" tolerance {tolerance}, against {standard}"
     )

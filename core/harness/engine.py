@@ -14,6 +14,8 @@ from functools import partial
 from typing import Any, Protocol, runtime_checkable
 
 from ..case.case import Case
+from ..doors import offers
+from ..errors import UnsupportedError
 from ..trajectory import Trajectory
 
 STANDARD = "native"
@@ -123,6 +125,17 @@ class Balancing(Engine, Protocol):
         motions are in equilibrium, on the way of continuous loads and values from the design.
         """
         ...
+
+
+def equilibria_of(engine: Any, case: Case, kind: str) -> Trajectory:
+    """Return the equilibria that an extension finds with an engine of a kind.
+
+    Raises:
+        UnsupportedError: no extension does.
+    """
+    if kind not in (known := offers("equilibria")):
+        raise UnsupportedError(f"no extension finds equilibria with {engine.name}")
+    return known[kind].load()(engine, case)
 
 
 @runtime_checkable

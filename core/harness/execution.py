@@ -31,7 +31,7 @@ WARM_BUDGET = 0.5
 UNLIKE = 2.0
 
 # Longest message [characters]: a page. An engine may put all its data into one.
-LONGEST_MESSAGE = 2000
+LONGEST_MESSAGE = 20_000
 
 
 @dataclass(frozen=True, eq=False)

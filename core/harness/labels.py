@@ -7,11 +7,12 @@ from typing import Any, cast
 
 import msgspec
 
-from ..case.case import PER_TRAVEL, Truth
+from ..case.case import PER_TRAVEL, TIME, Case, Truth
+from ..case.units import ANGLES, LENGTHS
 from ..errors import number_of, shortened
 from ..trajectory import PER_TIME, QUANTITIES
-from ..unit_text import unit_text
-from .record import Outcome, Record, Results
+from ..unit_text import unit_text, value_text
+from .record import Facts, Outcome, Record, Results
 
 TRUTHS = {
     Truth.CLOSED_FORM: "closed form",
@@ -139,6 +140,66 @@ def motion_unit(unit: str, motion: str) -> str:
     return unit_text(unit + PER_TIME[QUANTITIES.index(motion)])
 
 
+DRIVER_UNITS = {
+    "point_coordinate": "m",
+    "joint_displacement": "m",
+    "joint_angle": "rad",
+    "time": "s",
+}
+"""SI unit of the values of a driver, by its type."""
+
+
+def driver_unit(facts: Facts) -> str:
+    """Return the SI unit of the swept driver, from the facts of a case; empty if unknown."""
+    return DRIVER_UNITS.get(facts.get("driver", {}).get("type", ""), "")
+
+
+def table_facts(case: Case) -> Facts:
+    """Return the units of a table of hardpoints and the type of its driver, as a part of the facts
+    of its case; empty for another file.
+    """
+    driver = case.sweep.driver
+    kind = TIME if driver == TIME else case.mechanism.driver(driver).type
+    units = {"length": case.length_unit, "angle": case.angle_unit}
+    return {"units": units, "driver": {"type": kind}} if case.hardpoints else {}
+
+
+def in_table_units(unit: str, facts: Facts) -> tuple[str, float]:
+    """Return the name of an SI unit in the units of a case of hardpoints, and its size [SI]. Rates
+    of change per metre stay per metre, and forces and torques in N and N m. Other cases are in SI.
+    """
+    measure, *per = unit.split("/", 1)
+    if "units" not in facts or measure not in ("m", "rad"):
+        return unit, 1.0
+    of = facts["units"]
+    found = LENGTHS[of["length"]] if measure == "m" else ANGLES[of["angle"]]
+    return "/".join([found.name, *per]), found.size
+
+
+def displayed(unit: str, facts: Facts) -> tuple[str, float]:
+    """Return the name of an SI unit as people read it, and the factor to it; see
+    `in_table_units`.
+    """
+    text, size = in_table_units(unit, facts)
+    return unit_text(text).replace("deg", "\N{DEGREE SIGN}"), 1.0 / size
+
+
+def shown_text(value: float, unit: str, facts: Facts, form: str = "") -> str:
+    """Return a number [SI] with its unit, as people read it; see `in_table_units`.
+
+    Args:
+        form: format of the number; by default that of `number`.
+    """
+    text, factor = displayed(unit, facts)
+    return value_text(f"{factor * value:{form}}" if form else number(factor * value), text)
+
+
+def shown_change(before: float, now: float, unit: str, facts: Facts) -> str:
+    """Return two numbers [SI] with their unit, as people read them; see `in_table_units`."""
+    _, factor = displayed(unit, facts)
+    return f"{number(factor * before)} → {shown_text(now, unit, facts)}"
+
+
 def number(value: float | None) -> str:
     """Return a number to three digits for a table; a dash if it was not computed."""
     if value is None:
@@ -147,6 +208,22 @@ def number(value: float | None) -> str:
         return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
     mantissa, _, exponent = f"{value:.2e}".partition("e")
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}" if exponent else mantissa
+
+
+LINES, CHARACTERS = 5, 2000
+"""Most lines and characters of an engine's message that a table or Markdown shows."""
+
+
+def folded(message: str) -> str:
+    """Return a message without its middle, if it is long; the JSON has it."""
+    lines = message.splitlines()
+    if len(lines) > LINES:
+        left = f"[{len(lines) - LINES + 1} lines more, all in the JSON]"
+        message = "\n".join([*lines[: LINES - 2], left, lines[-1]])
+    if len(message) > CHARACTERS:
+        left = f"[{len(message) - CHARACTERS} characters more, all in the JSON]"
+        message = f"{message[: CHARACTERS // 2]} {left} {message[-CHARACTERS // 2 :]}"
+    return message
 
 
 def value_words(value: Any) -> Any:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from ..case.case import Balance, Case
-from ..failures import FailureKind
-from ..forces import Forces
-from ..kinematics import LAST_ITERATION, NativeSolver, ProgramSize, Solver, Style
+from ..case.case import Case
+from ..kinematics import LAST_ITERATION, NATIVE, NativeSolver, ProgramSize, Solver
 from ..program.llvm.machine_code import available
-from ..trajectory import PointMotion, Trajectory, shown
+from ..trajectory import Trajectory, shown
 from ..version import VERSION
-from .engine import STANDARD
+from .engine import STANDARD, equilibria_of
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,7 @@ class NativeEngine:
             else "numpy, one call an operation over all lanes"
         )
         last = solver.last_iteration if math.isfinite(solver.last_iteration) else "any"
-        axes = " (global axes)" if solver.style is Style.NATIVE else ""
+        axes = " (global axes)" if solver.style == NATIVE else ""
         return {
             "row_style": f"{solver.style}{axes}",
             "executor": executor,
@@ -92,33 +88,7 @@ class NativeEngine:
 
     def equilibria(self, case: Case) -> Trajectory:
         """Return the equilibria of a case; see `engine.Balancing`."""
-        from ..kinematics import StaticModel, largest_residual
-
-        mechanism, balance, path = case.mechanism, case.balance or Balance(), case.sweep.path
-        names = [driver.name for driver in mechanism.drivers]
-        travel = dict(zip(names, path.drive(names, path.times)[0], strict=True))
-        found = StaticModel(mechanism, balance.places).solve(balance.loads, travel, slopes=False)
-
-        def place(name: str) -> PointMotion:
-            point = mechanism.point(name)
-            at = found.place(point.body, point.position)
-            return PointMotion(np.where(found.reached[:, None], at, np.nan), None, None)
-
-        kept = {
-            name: replace(each, r=each.r[found.reached], p=each.p[found.reached])
-            for name, each in found.bodies.items()
-        }
-        unknown = np.full(len(found.reached), np.nan)
-        efforts = {name: np.where(found.reached, x, np.nan) for name, x in found.efforts.items()}
-        return Trajectory(
-            {name: place(name) for name in case.points},
-            found.reached,
-            found.iterations,
-            largest_residual(mechanism, mechanism.joints, kept),
-            "" if found.reached.all() else "the path of loads and travel turns back (snap-through)",
-            forces=Forces({}, efforts, {}, unknown, unknown),
-            failures=[] if found.reached.all() else [FailureKind.NOT_FOUND],
-        )
+        return equilibria_of(self, case, "native")
 
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
         """Solve all samples in order; tol is relative to the mechanism's size."""

@@ -20,6 +20,7 @@ from ..case.notes import notes
 from ..mechanism.motions import Absolute, Motion, Slowed
 from ..version import VERSION
 from .compare import as_numbers
+from .labels import table_facts
 from .record import IDENTICAL, OutputSeries, Record, Results
 from .suspects import suspect
 
@@ -212,6 +213,7 @@ def case_facts(case: Case) -> dict[str, Any]:
         if sweep.driver == TIME
         else _driver(case, sweep.driver) | {"rate": sweep.rate}
     )
+    units = table_facts(case).get("units")
     return {
         "source": case.source,
         "truth": truth_of(case),
@@ -224,11 +226,7 @@ def case_facts(case: Case) -> dict[str, Any]:
         "notes": notes(case),
         "outputs": {output.name: dict(output.facts) for output in case.outputs},
         **({"formerly": list(case.formerly)} if case.formerly else {}),
-        **(
-            {"units": {"length": case.length_unit, "angle": case.angle_unit}}
-            if case.hardpoints
-            else {}
-        ),
+        **({"units": units} if units else {}),
     }
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, combinations
 from typing import TypeAlias
 
@@ -17,10 +17,11 @@ from ..case.io.sections import sections
 from ..case.units import ANGLES, LENGTHS, SECOND, Unit
 from ..errors import shortened
 from ..trajectory import QUANTITIES, Array
-from ..unit_text import motion_word, value_text
+from ..unit_text import motion_word
 from .compare import Curve, as_array, curve_of, deviation
 from .engine import RECORDED, STANDARD
-from .record import REFERENCE, Deviation, Deviations, Explanation, Record, Suspect
+from .labels import shown_text, table_facts
+from .record import REFERENCE, Deviation, Deviations, Explanation, Facts, Record, Suspect
 
 # Largest number of outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12
@@ -86,7 +87,7 @@ def _of_reference(case: Case, mine: Sequence[Record]) -> Suspect | None:
     if len(engines) == 1 and (explained[1] or not explained[0]):
         return None
     agreed = agreement.get((off[0].output, off[0].order), 0.0)
-    within = value_text(_number(agreed), off[0].held.unit)
+    within = off[0].held.text(agreed)
     who = (
         f"{engines[0]} is the only engine that solved it"
         if len(engines) == 1
@@ -131,7 +132,7 @@ def _of_native(case: Case, mine: Sequence[Record], native: Mapping[str, Series])
     engines = list(dict.fromkeys(record.engine for record in group))
     who = (
         f"{len(_simulators(group))} of {voters} other engines agree with each other within"
-        f" {value_text(_number(agreed), worst.held.unit)} ({', '.join(engines)})"
+        f" {worst.held.text(agreed)} ({', '.join(engines)})"
     )
     return _suspicion(case, STANDARD, engines, agreed, off_too, explained, who)
 
@@ -177,7 +178,7 @@ def _suspicion(
     outputs: dict[str, list[str]] = {}
     for each in off:
         outputs.setdefault(each.output, []).append(QUANTITIES[each.order])
-    reasons = _reasons(subject, explanations, left)
+    reasons = _reasons(table_facts(case), subject, explanations, left)
     difference = _difference(case, subject, worst)
     return Suspect(
         subject=subject,
@@ -202,8 +203,7 @@ def _difference(case: Case, subject: str, worst: _Off) -> str:
         f"sample {step} ({case.sweep.driver} ="
         f" {_unit(case).written(float(case.sweep.values[step]))})"
     )
-    off = value_text(_number(worst.deviation.max_abs), worst.held.unit)
-    tolerance = value_text(_number(worst.deviation.tolerance), worst.held.unit)
+    off, tolerance = map(worst.held.text, (worst.deviation.max_abs, worst.deviation.tolerance))
     held = f"{motion_word(QUANTITIES[worst.order], worst.held.unit)}, tolerance {tolerance}"
     return f"{_the(subject)} differs by {off} at {at} of output {worst.output} ({held})"
 
@@ -220,22 +220,20 @@ def _unit(case: Case) -> Unit:
     return ANGLES[case.angle_unit] if turns else LENGTHS[case.length_unit]
 
 
-def _reasons(subject: str, explanations: Sequence[Explanation], left: Sequence[str]) -> str:
+def _reasons(
+    facts: Facts, subject: str, explanations: Sequence[Explanation], left: Sequence[str]
+) -> str:
     reasons: list[str] = []
     for each in explanations:
         words = ", ".join(motion_word(quantity, each.unit) for quantity in each.quantities)
         fits, within = (
-            value_text(_number(x), each.unit) for x in (each.difference, each.tolerance)
+            shown_text(x, each.unit, facts, ".3g") for x in (each.difference, each.tolerance)
         )
         fit = f"{_the(subject)} {each.change} fits within {fits}, tolerance {within}"
         reasons.append(f"{', '.join(each.outputs)} ({words}): {fit}")
     if left:
         reasons.append(f"{shortened(left, MOST_EXPLAINED)}: {UNEXPLAINED}")
     return "; ".join(reasons)
-
-
-def _number(value: float) -> str:
-    return f"{value:.3g}"
 
 
 def _against(errors: Deviations, case: Case) -> bool:
@@ -246,10 +244,12 @@ def _against(errors: Deviations, case: Case) -> bool:
 def _held(case: Case, rate_scale: float, record: Record, order: int) -> dict[str, Curve]:
     """Return the values of a record by output, with their tolerances."""
     found: dict[str, Curve] = {}
+    facts = table_facts(case)
     for output in case.outputs:
         values = as_array(getattr(record.outputs[output.name], QUANTITIES[order]))
         if order < output.orders and values is not None:
-            found[output.name] = curve_of(output, order, rate_scale, values)
+            curve = curve_of(output, order, rate_scale, values)
+            found[output.name] = replace(curve, facts=facts)
     return found
 
 
@@ -454,7 +454,7 @@ def _moves(held: Curve, reference: Curve, offsets: bool) -> list[NamedChange]:
     known = np.isfinite(off)
     if offsets and known.any():
         constant = 0.5 * float(off[known].max() + off[known].min())
-        size = value_text(f"{abs(constant):.9g}", held.unit)
+        size = held.text(abs(constant), ".9g")
         found.insert(0, (f"{'plus' if constant > 0 else 'minus'} {size}", lambda x: x + constant))
     return found
 

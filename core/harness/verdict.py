@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from ..case.case import Case, Origin, Quantity, Series, Truth, size
 from ..errors import shortened
 from ..trajectory import QUANTITIES, Array
-from ..unit_text import value_text
 from .compare import NO_VALUE, as_array, describe, deviations
 from .engine import STANDARD, Engine, bounds_error
 from .execution import Answer
-from .labels import against
+from .labels import against, driver_unit, shown_text, table_facts
 from .record import Deviation, Deviations, Evidence, Outcome, Record
 
 UNCERTAIN = "uncertain_samples"
@@ -198,7 +197,8 @@ def _worst(case: Case, errors: Mapping[str, Deviations]) -> str:
     _, output, quantity, off = max(outside, key=lambda each: each[0])
     more = f" (worst of {len(outside)} quantities out of tolerance)" if len(outside) > 1 else ""
     values = case.sweep.values.tolist()
-    return describe(output.name, quantity, off, case.sweep.driver, values, output.unit) + more
+    about = case.sweep.driver, values, output.unit, table_facts(case)
+    return describe(output.name, quantity, off, *about) + more
 
 
 def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
@@ -213,12 +213,15 @@ def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
     if not at.any():
         return ""
     first = int(np.argmax(at))
+    facts = table_facts(case)
     values = [
-        f"{output.name} = {value_text(f'{value:.6g}', output.unit)}"
+        f"{output.name} = {shown_text(value, output.unit, facts, '.6g')}"
         for output in case.outputs
         if np.isfinite(value := answer.outputs[output.name].position[first])
     ]
-    where = f"sample {first} ({case.sweep.driver} = {case.sweep.values[first]:.9g})"
+    unit = driver_unit(facts)
+    driven = shown_text(float(case.sweep.values[first]), unit, facts, ".9g")
+    where = f"sample {first} ({case.sweep.driver} = {driven})"
     return (
         f"values at {at.sum()} of {samples} samples that {STANDARD} cannot reach, first at {where}:"
         f" {shortened(values, NAMED)}; {STANDARD}: {native.why or 'gives no reason'}"

@@ -12,10 +12,10 @@ from typing import Any, TypeAlias
 import msgspec
 
 from ..case.io.outputs import DEFAULT_ATOL
-from ..harness.labels import UNMADE, motion_unit, number
+from ..harness.labels import UNMADE, motion_unit, number, shown_change, shown_text
 from ..harness.record import Facts, Outcome, OutputSeries, Record
 from ..trajectory import QUANTITIES
-from ..unit_text import motion_word, value_text
+from ..unit_text import motion_word
 from .findings import (
     Accepted,
     Change,
@@ -281,9 +281,10 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
             continue
         findings += _outcomes(record, old)
         findings += _lost(record, old)
-        findings += _find_moved(record, old)
-        findings += _errors(record, old)
-        findings += _references(record, *references)
+        facts = now.facts.get("cases", {}).get(record.case, {})
+        findings += _find_moved(record, old, facts)
+        findings += _errors(record, old, facts)
+        findings += _references(record, *references, facts)
         state = now.states.get(record.pair)
         if before.bases and state is not None:
             findings += _slower_on_machine(record, state, now, slowest)
@@ -355,7 +356,7 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
         yield Finding.of(Kind.LOST, now, f"no longer validated: judged against {why}")
 
 
-def _find_moved(now: Record, before: Record) -> Iterator[Finding]:
+def _find_moved(now: Record, before: Record, facts: Facts) -> Iterator[Finding]:
     """Yield the outputs with changed values or samples, which only this comparison shows if there
     is no reference.
     """
@@ -366,6 +367,8 @@ def _find_moved(now: Record, before: Record) -> Iterator[Finding]:
         return
     moved: set[str] = set()
     for each in quantities(now, before):
+        if each.judged and not each.judged.within and each.was_judged and each.was_judged.within:
+            continue  # a failure, which is reported there
         if each.judged:  # largest distance of two values within the tolerance of one standard
             limit = 2.0 * each.judged.tolerance
         else:  # forces set no scale for lengths
@@ -375,24 +378,25 @@ def _find_moved(now: Record, before: Record) -> Iterator[Finding]:
         off = largest_difference(each.old, each.new)
         if off > limit and each.output not in moved:
             moved.add(each.output)
-            size = value_text(number(off), motion_unit(each.unit, each.motion))
+            size = shown_text(off, motion_unit(each.unit, each.motion), facts)
             message = f"{each.word} differs by up to {size} from its earlier values"
             yield Finding.of(Kind.MOVED, now, message, now=off, limit=limit, **each.place)
 
 
-def _errors(now: Record, before: Record) -> Iterator[Finding]:
+def _errors(now: Record, before: Record, facts: Facts) -> Iterator[Finding]:
     for output, old in before.errors.items():
         for motion in QUANTITIES:
             a, b = getattr(old, motion), getattr(now.errors.get(output), motion, None)
             if a is None or b is None:
                 continue
-            unit = now.outputs[output].unit if output in now.outputs else ""
-            word = f"{output} {motion_word(motion, unit)}"
+            base = now.outputs[output].unit if output in now.outputs else ""
+            word = f"{output} {motion_word(motion, base)}"
+            unit = motion_unit(base, motion) if base else ""
             if a.tolerance != b.tolerance:
                 yield Finding.of(
                     Kind.TOLERANCE,
                     now,
-                    f"{word}: {number(a.tolerance)} → {number(b.tolerance)}",
+                    f"{word}: {shown_change(a.tolerance, b.tolerance, unit, facts)}",
                     before=a.tolerance,
                     now=b.tolerance,
                     output=output,
@@ -405,11 +409,12 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
                 and has_drifted(a.max_abs, b.max_abs, b.tolerance)
             ):
                 times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
-                words = f" ({times}tolerance {number(b.tolerance)})"
-                yield drift(now, output, motion, a.max_abs, b, words)
+                yield drift(now, output, motion, a.max_abs, b, f" ({times}", facts)
 
 
-def _references(record: Record, now: References, before: References) -> Iterator[Finding]:
+def _references(
+    record: Record, now: References, before: References, facts: Facts
+) -> Iterator[Finding]:
     """Yield the changed reference values; other findings show new and missing ones."""
     for output, old in before.get(record.case, {}).items():
         new = now.get(record.case, {}).get(output)
@@ -417,10 +422,9 @@ def _references(record: Record, now: References, before: References) -> Iterator
             was = values_of(old, motion)
             off = largest_difference(was, values_of(new, motion))
             if off > SAME_SAMPLE * largest(was):
-                message = (
-                    f"{output} {motion_word(motion, old.unit)} differs by up to {number(off)}"
-                    f" {motion_unit(old.unit, motion)} from its earlier values"
-                )
+                size = shown_text(off, motion_unit(old.unit, motion), facts)
+                word = f"{output} {motion_word(motion, old.unit)}"
+                message = f"{word} differs by up to {size} from its earlier values"
                 about: dict[str, Any] = {"now": off, "output": output, "motion": motion}
                 yield Finding.of(Kind.REFERENCE, record, message, **about)
                 break

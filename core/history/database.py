@@ -181,6 +181,17 @@ def check(connection: sqlite3.Connection) -> int:
     return version
 
 
+def require_sound(connection: sqlite3.Connection) -> None:
+    """Refuse a file of damaged structure.
+
+    Raises:
+        ValueError: it is damaged.
+    """
+    (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    if found != "ok":
+        raise ValueError(f"it is damaged ({found.splitlines()[-1]}); restore a copy")
+
+
 def write_ahead(connection: sqlite3.Connection, patience: float) -> None:
     """Turn on write-ahead logging, so that readers and a writer do not wait for each other.
 
@@ -307,11 +318,14 @@ def writable_connection(path: Path) -> sqlite3.Connection:
     """
     connection = sqlite3.connect(path, timeout=BUSY, isolation_level=None)
     try:
-        check(connection)  # before any change, in case the file belongs to another program
+        version = check(connection)  # before any change: it may be another program's, or damaged
+        if 0 < version < len(MIGRATIONS):
+            require_sound(connection)
         write_ahead(connection, BUSY)
         connection.execute("PRAGMA synchronous = FULL")  # a commit survives a power failure, too
         connection.execute("PRAGMA foreign_keys = ON")
-        migrate(connection)
+        if version < len(MIGRATIONS):
+            migrate(connection)
     except BaseException:
         connection.close()
         raise
@@ -320,6 +334,9 @@ def writable_connection(path: Path) -> sqlite3.Connection:
 
 def readable_connection(path: Path) -> sqlite3.Connection:
     """Return a connection for reading; migrate a file of an older version first.
+
+    Nothing is written with it, but it is no read-only connection, which would leave the journal
+    beside the file when it is closed.
 
     Raises:
         HistoryError: the file is missing, is not a history, or is incomplete without its journal.
@@ -330,7 +347,7 @@ def readable_connection(path: Path) -> sqlite3.Connection:
             f"history {path}: there is no such file; `kincheck run --history FILE` creates one"
         )
     # In a read-only folder the file has no journal beside it, so no process writes it.
-    for how in ("mode=ro", "mode=ro&immutable=1"):
+    for how in ("mode=rw", "mode=ro&immutable=1"):
         connection = sqlite3.connect(
             f"{path.absolute().as_uri()}?{how}",
             uri=True,
@@ -341,7 +358,7 @@ def readable_connection(path: Path) -> sqlite3.Connection:
             version = check(connection)
         except sqlite3.OperationalError:
             connection.close()
-            if how != "mode=ro":
+            if how != "mode=rw":
                 raise
             _require_whole(path)
             continue

@@ -136,6 +136,7 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
         quantity: position, velocity or acceleration (errors), time, or outcome.
         output: output whose error has the largest step; null for time and outcome.
         unit: unit of the output; empty for an error without a unit, for time and for outcome.
+        units: of the table of hardpoints of the case, for the step's text; empty without one.
         first: number of the first run of the new level, which began at `started`.
         last: number of the last run of the previous level.
         before, now: the levels: errors [SI], seconds; null for an outcome.
@@ -150,6 +151,7 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
     quantity: str
     output: str | None
     unit: str = ""
+    units: dict[str, str] = {}
     first: int
     started: str
     last: int

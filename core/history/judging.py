@@ -27,8 +27,8 @@ def judge_runs(store: Store) -> None:
     """Store the states of all ended runs without any, in their order. If a run ended late, all
     later runs are judged again.
 
-    The states are the only thing that a store writes although it is open for reading; in a file
-    that cannot be written, they are kept in a temporary table.
+    The states are the only thing that a store writes although it is open for reading; for a file
+    that is damaged or cannot be written, they are kept in a temporary table.
 
     Raises:
         HistoryError: the file cannot be read or written.
@@ -37,9 +37,11 @@ def judge_runs(store: Store) -> None:
     if not unjudged:
         return
     if not store.writable:
-        with suppress(HistoryError), Store(store.path) as other:
-            judge_runs(other)
-            store.passed_over |= other.passed_over
+        with suppress(HistoryError):
+            store.require_sound(0)
+            with Store(store.path) as other:
+                judge_runs(other)
+                store.passed_over |= other.passed_over
         unjudged = _unjudged(store)
         if not unjudged:
             return

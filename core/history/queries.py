@@ -218,24 +218,24 @@ def entries_of(store: Store, run: int) -> list[tuple[Pair, Entry]]:
     return found
 
 
-def faultless(store: Store) -> set[int]:
-    """Return the numbers of the green runs, complete and with at least one pass and no fault, by
-    their outcomes alone: their records are not read.
+def faultless(store: Store, rows: Sequence[RunRow]) -> set[int]:
+    """Return the numbers of the green ones of the latest runs, complete and with at least one pass
+    and no fault, by their outcomes alone: their records are not read.
 
     Raises:
         HistoryError: the file cannot be read.
     """
     query = (
-        f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({_BAD})) = 0"
+        "SELECT run_id, count(*) FROM records WHERE run_id >= ? GROUP BY run_id HAVING"
+        f" sum(outcome IN ({_BAD})) = 0"
         f" AND sum({OUTCOME} = 'pass') > 0"
     )
     with store.explained("read"):
-        good: dict[int, int] = dict(store.connection.execute(query).fetchall())
+        first = min((row.id for row in rows), default=0)
+        good: dict[int, int] = dict(store.connection.execute(query, (first,)).fetchall())
     # a finished run lacks the pairs of unreadable cases: its status was 2
     return {
-        row.id
-        for row in store.runs()
-        if row.status == "finished" and good.get(row.id) == len(row.plan)
+        row.id for row in rows if row.status == "finished" and good.get(row.id) == len(row.plan)
     }
 
 

@@ -23,10 +23,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..case.case import Array
-from ..harness.labels import motion_unit, number
-from ..harness.record import Deviation, Outcome, Record
+from ..harness.labels import displayed, motion_unit, number, shown_change
+from ..harness.record import Deviation, Facts, Outcome, Record
 from ..trajectory import QUANTITIES
-from ..unit_text import motion_word, value_text
+from ..unit_text import motion_word
 from .findings import Change, Finding, Kind, Step, changes
 from .queries import IDLE, Entry, History, calibration, unit_of
 from .store import Pair
@@ -320,8 +320,10 @@ def _errors(history: History, pair: Pair, entries: Sequence[Entry], motion: str)
                 float(np.median([errors[k][1].max_abs for k in part]))
                 for part in (level.earlier, level.later)
             )
-            unit = unit_of(history.runs[level.first.run], level.first.case, output)
-            about = {"quantity": motion, "output": output, "unit": unit}
+            row, case = history.runs[level.first.run], level.first.case
+            units = row.circumstances.get("cases", {}).get(case, {}).get("units", {})
+            about = {"quantity": motion, "output": output, "unit": unit_of(row, case, output)}
+            about["units"] = units
             step = _new_level(history, pair, level, before, now, **about)
             key, size = (step.first, step.worse, step.repaired), abs(level.now - level.before)
             if key not in largest or size > largest[key][0]:
@@ -415,23 +417,36 @@ def with_crept(subject: Subject, findings: Sequence[Finding]) -> list[Finding]:
                 alike = (least.tolerance, least.against) == (now.tolerance, now.against)
                 grown = has_drifted(least.error, now.max_abs, now.tolerance)
                 if alike and grown and least.error < before:
-                    words = f", gradually since run {least.run} (tolerance {number(now.tolerance)})"
-                    each = drift(record, output, motion, least.error, now, words)
+                    words = f", gradually since run {least.run} ("
+                    facts = subject.facts.get("cases", {}).get(record.case, {})
+                    each = drift(record, output, motion, least.error, now, words, facts)
                     found[key or (*each.pair, each.kind, output, motion, each.message)] = each
     return [*found.values()]
 
 
 def drift(
-    record: Record, output: str, motion: str, before: float, now: Deviation, words: str
+    record: Record,
+    output: str,
+    motion: str,
+    before: float,
+    now: Deviation,
+    words: str,
+    facts: Facts,
 ) -> Finding:
-    """Return the finding of an error that has grown, with further words on it."""
+    """Return the finding of an error that has grown, with words before its tolerance.
+
+    Args:
+        facts: of the case, for the units of the text.
+    """
     base = record.outputs[output].unit if output in record.outputs else ""
-    size = value_text(number(now.max_abs), motion_unit(base, motion) if base else "")
+    unit = motion_unit(base, motion) if base else ""
     word = motion_word(motion, base)
+    size = shown_change(before, now.max_abs, unit, facts)
+    tolerance = number(displayed(unit, facts)[1] * now.tolerance)
     return Finding.of(
         Kind.DRIFTED,
         record,
-        f"{output} {word} error {number(before)} → {size}{words}",
+        f"{output} {word} error {size}{words}tolerance {tolerance})",
         output=output,
         motion=motion,
         before=before,

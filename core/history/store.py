@@ -17,7 +17,7 @@ import os
 import platform
 import sqlite3
 import zlib
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -35,6 +35,7 @@ from .database import (
     damage_lines,
     explained,
     readable_connection,
+    require_sound,
     writable_connection,
 )
 
@@ -47,6 +48,9 @@ Plan: TypeAlias = Sequence[Pair]
 # Level of compression: the best level makes a record of 73 kB 3 % smaller, and takes 6 ms instead
 # of 1.
 QUICK = 1
+
+KEPT = 100
+"""Number of latest runs whose circumstances stay in memory, as reports read them."""
 
 FIELDS = ("engine", "mode", "message", "validated", "version", "solved", "samples")
 NUMBERS = ("residual_max", "us_per_step")
@@ -74,7 +78,8 @@ class RunRow:
 
     Attributes:
         key: those circumstances by which runs are chosen.
-        text: all circumstances, as JSON.
+        text: all circumstances, as JSON; None for earlier runs than the latest `KEPT`.
+        store: the file, which has them: those of thousands of runs are a hundred MB.
     """
 
     id: int
@@ -84,12 +89,13 @@ class RunRow:
     command: str
     plan: Plan
     key: dict[str, Any]
-    text: bytes
+    text: bytes | None
+    store: Store
 
     @cached_property
     def circumstances(self) -> dict[str, Any]:
         """The circumstances of the run, as `Results.run`."""
-        return msgspec.json.decode(self.text)
+        return msgspec.json.decode(self.text or self.store.run(self.id).text or b"")
 
     @property
     def git(self) -> dict[str, Any]:
@@ -124,16 +130,11 @@ class Store:
         damaged records are passed over.
 
         Args:
-            latest: number of runs whose records are checked, as a report reads them.
+            latest: number of runs whose records are checked, as a report reads them; 0 for none.
         """
         with self.explained("written"):
-            (found,) = self.connection.execute("PRAGMA quick_check(1)").fetchone()
-        if found != "ok":
-            why = found.splitlines()[-1]
-            raise HistoryError(
-                f"history {self.path}: cannot be written: it is damaged ({why}); restore a copy"
-            )
-        for row in self.runs()[:latest]:
+            require_sound(self.connection)
+        for row in self.runs()[:latest] if latest else ():
             with self.sparing(), self.explained("read", row.id):
                 query = "SELECT record FROM records WHERE run_id = ?"
                 for (record,) in self.connection.execute(query, (row.id,)):
@@ -228,24 +229,26 @@ class Store:
         them.
         """
         if self._runs is None:
-            self._runs = [*self._read_runs()]
+            self._runs = self._read_runs()
         return [row for row in self._runs if row.id not in self.passed_over]
 
-    def _read_runs(self) -> Iterator[RunRow]:
+    def _read_runs(self) -> list[RunRow]:
         plans: dict[bytes, Plan] = {}
+        found: list[RunRow] = []
         try:
-            rows = self.connection.execute(f"{_ROW} ORDER BY id DESC").fetchall()
+            for row in self.connection.execute(f"{_ROW} ORDER BY id DESC"):
+                with self.sparing(), self.explained("read", row[0]):
+                    found.append(self._row(row, plans, kept=len(found) < KEPT))
+            return found
         except sqlite3.Error:  # a damaged run, which would hide all others
             with self.explained("read"):
                 query = "SELECT id FROM runs ORDER BY id DESC"
                 numbers = self.connection.execute(query).fetchall()
+            found.clear()
             for (number,) in numbers:
                 with self.sparing():
-                    yield self.run(number)
-            return
-        for row in rows:
-            with self.sparing(), self.explained("read", row[0]):
-                yield _run_row(row, plans)
+                    found.append(self.run(number))
+            return found
 
     @contextmanager
     def sparing(self) -> Generator[None]:
@@ -269,8 +272,24 @@ class Store:
         with self.explained("read", run):
             row = self.connection.execute(f"{_ROW} WHERE id = ?", (run,)).fetchone()
             if row is not None:
-                return _run_row(row, {})
+                return self._row(row, {})
         raise HistoryError(f"history {self.path}: there is no run {run}")
+
+    def _row(self, row: Sequence[Any], plans: dict[bytes, Plan], *, kept: bool = True) -> RunRow:
+        """Return a row of `_ROW`.
+
+        Args:
+            plans: those read so far, by their texts; most runs of a history have the same.
+            kept: whether the circumstances stay in memory.
+        """
+        number, started, finished, status, command, plan, text, process = row
+        if plan not in plans:
+            plans[plan] = msgspec.json.decode(plan, type=list[Pair])
+        key = msgspec.structs.asdict(msgspec.json.decode(text, type=_Key))
+        killed = status == "running" and not alive(process)
+        status = "killed" if killed else status
+        about = started, finished, status, command, plans[plan], key
+        return RunRow(number, *about, text if kept else None, self)
 
     def records(self, run: int) -> list[Record]:
         """Return the records of a run, in the order of its plan."""
@@ -335,21 +354,6 @@ class Store:
     def explained(self, what: str, run: int | None = None) -> AbstractContextManager[None]:
         """Raise faults of the database as a HistoryError; see `faults`."""
         return explained(self.path, what, run)
-
-
-def _run_row(row: Sequence[Any], plans: dict[bytes, Plan]) -> RunRow:
-    """Return a row of `_ROW`.
-
-    Args:
-        plans: those read so far, by their texts; most runs of a history have the same.
-    """
-    number, started, finished, status, command, plan, text, process = row
-    if plan not in plans:
-        plans[plan] = msgspec.json.decode(plan, type=list[Pair])
-    key = msgspec.structs.asdict(msgspec.json.decode(text, type=_Key))
-    killed = status == "running" and not alive(process)
-    status = "killed" if killed else status
-    return RunRow(number, started, finished, status, command, plans[plan], key, text)
 
 
 def _json(value: Any) -> str:

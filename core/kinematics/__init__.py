@@ -6,7 +6,6 @@ Solve:
 
     solve              one design over a sweep
     solve_designs      many designs over a sweep, each with its own geometry
-    StaticModel        equilibria of a mechanism whose drivers are held, and its compliance
     forces_of          reactions of joints and efforts of drivers of a solved motion
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
@@ -28,16 +27,16 @@ Describe:
     kinds, places, placed                           the geometry by name
     LoadPlace, load_places                          masses and loads by name
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
+    formulate, styles, NATIVE, MIXED                the same in a row style
     is_continuation, continuous, regular_between    tests of a step
     motion_defects                                  a motion of bodies against the constraints
 
 The folders:
 
-    formulation      constraints as equations, in Cartesian or joint coordinates
+    formulation      constraints as equations
     structure        degrees of freedom, redundant rows, components, sparse factors
     compiled         one mechanism as compiled programs: request, programs, model, routes
     continuation     the walk along a path, singular poses, curves by arc length
-    statics          equilibria with springs, bushings and loads, and their compliance
     forces           the equations of forces, and the forces of a solved motion
     assembly         closed poses from estimates and random starts
 """
@@ -72,8 +71,9 @@ if TYPE_CHECKING:
         regular_between,
     )
     from .formulation.cartesian import COLUMNS, Cartesian
-    from .formulation.constraints import Frames, Relation, Style, constraints, unit_near
+    from .formulation.constraints import Frames, Relation, constraints, unit_near
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
+    from .formulation.styles import MIXED, NATIVE, formulate, styles
     from .motion_solver import Method, Solver
     from .native_solver import NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import solve
@@ -89,8 +89,6 @@ if TYPE_CHECKING:
         replay_motions,
         residuals,
     )
-    from .statics.equations import LoadPoint, with_free_coordinates
-    from .statics.equilibrium import Equilibria, StaticModel
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
 
@@ -109,7 +107,8 @@ _NAMES = {
         "LONGEST_TURN ROUNDING is_continuation continuous regular_between"
     ),
     "formulation.cartesian": "COLUMNS Cartesian",
-    "formulation.constraints": "Frames Relation Style constraints unit_near",
+    "formulation.constraints": "Frames Relation constraints unit_near",
+    "formulation.styles": "MIXED NATIVE formulate styles",
     "formulation.parameters": "LoadPlace kinds load_places placed places",
     "native_solver": "NativeSolver PreparedDesigns ProgramSize",
     "motion_solver": "Method Solver",
@@ -118,8 +117,6 @@ _NAMES = {
         "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces"
         " replay_motions residuals"
     ),
-    "statics.equations": "LoadPoint with_free_coordinates",
-    "statics.equilibrium": "Equilibria StaticModel",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",
 }

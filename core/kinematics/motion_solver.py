@@ -18,7 +18,7 @@ from ..trajectory import Trajectory
 from .compiled.request import Request
 from .compiled.routes import recent_route
 from .continuation.sweep import follow
-from .formulation.constraints import Style
+from .formulation.styles import NATIVE
 
 Solver = Callable[[float], Trajectory]
 """Solves what it was made for, to a tolerance."""
@@ -47,7 +47,7 @@ def by_method(method: Method) -> Callable[[Mechanism, Request], Callable[[Path],
 
 def in_blocks(mechanism: Mechanism, request: Request) -> bool:
     """Return whether a mechanism is too large for one program, and there is another way."""
-    large = len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE
+    large = len(mechanism.moving) > ONE_PROGRAM and request.style == NATIVE
     return large and by_method(Method.BY_SIZE) is not None
 
 

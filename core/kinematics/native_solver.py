@@ -20,7 +20,7 @@ from .compiled.step_programs import ALONE, JOINED
 from .continuation.walk import marcher
 from .design_batch import RECYCLED, Variants, slopes_of, solve_variants
 from .forces.wanted import WantedForces, wanted_forces
-from .formulation.constraints import Style
+from .formulation.styles import NATIVE
 from .motion_solver import Method, Solver, by_method
 from .one_design import by_motion, by_program, motion_only, prepare, start_notes
 
@@ -34,7 +34,7 @@ class NativeSolver:
 
     Attributes:
         order: 0 positions, 1 and velocities, 2 and accelerations.
-        style: form of the rows.
+        style: row style.
         compiled: run by machine code if llvmlite is installed, else by numpy; the results are the
             same to round-off.
         last_iteration: a sample's iteration from a residual below this is its last [units of the
@@ -44,7 +44,7 @@ class NativeSolver:
     """
 
     order: int = 2
-    style: Style = Style.NATIVE
+    style: str = NATIVE
     compiled: bool = True
     last_iteration: float = LAST_ITERATION
     method: Method = Method.BY_SIZE

@@ -21,7 +21,7 @@ from .compiled.request import Request
 from .compiled.routes import Route, recent_route, start_of
 from .continuation.sweep import follow
 from .forces.wanted import wanted_forces
-from .formulation.constraints import Style
+from .formulation.styles import NATIVE, require_style
 from .motion_solver import Solver, in_blocks, prepare_motion
 from .structure.degrees_of_freedom import require_driven
 
@@ -120,7 +120,7 @@ def solve(
     bodies: Sequence[str] = (),
     order: int = 2,
     tol: float = 1e-12,
-    style: str = "native",
+    style: str = NATIVE,
     motions: Mapping[str, Motion] | None = None,
     forces: bool | Sequence[str] = False,
 ) -> Trajectory:
@@ -143,9 +143,10 @@ def solve(
             computed.
         tol: largest accepted constraint residual, relative to the mechanism's size; positive and
             finite.
-        style: form of the rows: "native" (global axes), "paper" (Tables 1-2, body axes),
-            "conventional" (full products), "mixed" (joint coordinates as further unknowns) or
-            "relative" (joint coordinates of a tree as the only ones); the solutions are the same.
+        style: form of the rows: "native" (global axes) or "mixed" (joint coordinates as further
+            unknowns); of the extension laboratory "paper" (Tables 1-2, body axes), "conventional"
+            (full products) or "relative" (joint coordinates of a tree as the only unknowns). The
+            solutions are the same.
         motions: of further drivers, with values measured likewise, over the time in which the swept
             one goes from its design value at the rate; the others hold. They are evaluated at the
             samples, and between them in divided steps: a motion there and back between two samples
@@ -204,7 +205,7 @@ def parse_solve_arguments(
     order: int,
     tol: float,
     bodies: Sequence[str] = (),
-    style: str = "native",
+    style: str = NATIVE,
 ) -> tuple[Path, Request]:
     """Return the path and the request for the arguments of `solve`.
 
@@ -235,7 +236,7 @@ def parse_solve_arguments(
             f"{who}: rate is {rate}: no number is the time of the values then; give a larger one"
         )
     path = Path({**as_changes(motions, design), driver: Ramp(float(rate))}, times, design)
-    return path, Request(tuple(path.motions), wanted, bodies, int(order), Style(style))
+    return path, Request(tuple(path.motions), wanted, bodies, int(order), require_style(style))
 
 
 def _problem(

@@ -138,6 +138,13 @@ class Table(Motion):
 
         return CubicSpline(self.times, self.values, bc_type="natural")
 
+    @property
+    def pieces(self) -> list[float]:
+        """Coefficients of the cubic from each time on, the highest power first, one after the
+        other.
+        """
+        return self._spline.c.T.ravel().tolist()
+
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         return self._spline(t), self._spline(t, 1), self._spline(t, 2)
 

@@ -11,19 +11,8 @@ Conventions of every primitive (formulation section 1, in the native row style):
 - The ground is a body that never moves: its u, D, v and w are literal zeros and vanish from every
   program.
 
-Each file has up to three row styles of a condition, one below the other:
-
-- Native, as above.
-- Paper: Tables 1 and 2 as corrected (formulation section 9), in body axes. Unknowns are (dr, dpi'),
-  velocities (rdot, w'), accelerations (rddot, w'dot). The native rows are these times A^T. They are
-  kept to measure the paper's claims.
-- Conventional: full matrix products, not simplified by the geometry, as textbooks and DADS have
-  them (Haug; formulation section 2), in body axes. Orientation conditions consist of dot10, line
-  conditions of dot20. Spherical, distance and driver rows have no simplified form; their paper rows
-  serve here too.
-
-A_ij = A_i^T A_j maps frame j to frame i; Om = A_ij w_j - w_i; W = skew(w). In body axes, w of a
-twist and dpi of a row have components in their own body.
+These rows are the paper's times A^T. The paper's own, in body axes, and conventional ones by full
+matrix products are in `core.extensions.laboratory.paper.rows`, to measure the paper's claims.
 """
 
 from __future__ import annotations
@@ -49,12 +38,7 @@ from ..algebra import (
     rotation_less_identity,
     vec,
 )
-from ..errors import SolveError
 from ..program.tape import Gradient, Tape, Traced, changes, folded
-
-
-class NoFormError(SolveError):
-    """A primitive has no rows in a row style."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +82,6 @@ class Twist:
     def centripetal(self, arm: Vec3) -> Vec3:
         """Return w x (w x arm): the acceleration of the point without vdot and wdot."""
         return cross(self.w, cross(self.w, arm))
-
-
-def relative(i: Pose, j: Pose) -> Mat3:
-    """Return A_ij: from frame j to frame i."""
-    return i.A.T.times(j.A)
 
 
 GROUND_POSE = Pose.of(ZERO, IDENTITY)
@@ -151,20 +130,6 @@ class Primitive(ABC):
     """Number of equations."""
     steady: ClassVar[bool] = False
     """Whether the rows keep their directions as body i turns."""
-    body_axes: ClassVar[bool] = False
-    """Whether dpi, w and wdot of rows, gamma and twists are in body axes (the paper's) rather than
-    global ones.
-    """
-    paper: ClassVar[type[Primitive] | None] = None
-    conventional: ClassVar[type[Primitive] | None] = None
-    """Classes with the same fields and the rows of another style, if there are any."""
-
-    def __init_subclass__(cls) -> None:
-        """Reset the forms in other styles: a base class's do not fit a subclass's own rows."""
-        super().__init_subclass__()
-        for form in ("paper", "conventional", "paper_form", "conventional_form"):
-            if form not in vars(cls):
-                setattr(cls, form, getattr(Primitive, form))
 
     @abstractmethod
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
@@ -213,30 +178,6 @@ class Primitive(ABC):
         spurious zeros.
         """
         return ()
-
-    def paper_form(self) -> tuple[Primitive, ...]:
-        """Return the primitives that replace this one in the paper's row style.
-
-        Raises:
-            NoFormError: the primitive has none.
-        """
-        return self._as(self.paper)
-
-    def conventional_form(self) -> tuple[Primitive, ...]:
-        """Return the primitives that replace this one in the conventional row style.
-
-        Raises:
-            NoFormError: the primitive has none.
-        """
-        return self._as(self.conventional) if self.conventional else self.paper_form()
-
-    def _as(self, kind: type[Primitive] | None) -> tuple[Primitive, ...]:
-        if kind is None:
-            raise NoFormError(
-                f"{type(self).__name__} has no rows in the styles paper and conventional; use the"
-                " style native, or write its paper_form"
-            )
-        return (kind(**{each.name: getattr(self, each.name) for each in fields(self)}),)
 
 
 class _Derivation:

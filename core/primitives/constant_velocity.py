@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, Vec3
 from .base import Pose, Primitive, Row, Twist
-from .dot10 import ConventionalDot10, Dot10, PaperDot10
+from .dot10 import Dot10
 
 
 @dataclass(frozen=True)
@@ -56,29 +56,3 @@ class ConstantVelocity(Primitive):
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         f, g = (i.turn(a) @ j.turn(b) for a, b in ((self.f_i, self.f_j), (self.g_i, self.g_j)))
         return (f + g,)
-
-
-class PaperConstantVelocity(ConstantVelocity):
-    """The difference of two dot10 in body axes."""
-
-    body_axes = True
-
-    @property
-    def pair(self) -> tuple[Dot10, Dot10]:
-        """The two dot10 that are subtracted."""
-        return PaperDot10(self.f_i, self.g_j), PaperDot10(self.g_i, self.f_j)
-
-
-class ConventionalConstantVelocity(ConstantVelocity):
-    """The difference of two dot10 by full products."""
-
-    body_axes = True
-
-    @property
-    def pair(self) -> tuple[Dot10, Dot10]:
-        """The two dot10 that are subtracted."""
-        return ConventionalDot10(self.f_i, self.g_j), ConventionalDot10(self.g_i, self.f_j)
-
-
-ConstantVelocity.paper = PaperConstantVelocity
-ConstantVelocity.conventional = ConventionalConstantVelocity

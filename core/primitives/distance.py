@@ -6,10 +6,6 @@ With d from P_i to P_j, dd its change since design, S = A s:
     rows  = [ -d | d x S_i | d | S_j x d ] / L
     gamma = -( ddot . ddot + d . (w_j x (w_j x S_j) - w_i x (w_i x S_i)) ) / L
 
-The paper in body axes: the same phi; u = d / L times the rows of the spherical condition.
-
-    rows  = [ -u | A_i^T u x s_i | u | s_j x A_j^T u ]
-
 This is the square form d . d - L^2 divided by 2 L: rows of unit scale and a residual in metres, as
 |d| - L has them, without a square root, and the difference of squares is never formed. The bare
 square form was rejected because its rows have the size of d; |d| - L because it is not smooth where
@@ -58,22 +54,3 @@ class Distance(Primitive):
                 * (1.0 / self.length)
             ),
         )
-
-
-class PaperDistance(Distance):
-    """The rows in body axes."""
-
-    body_axes = True
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        u = (1.0 / self.length) * (self.d0 + self.change(i, j))
-        return (Row(-u, cross(i.A.T @ u, self.s_i), u, cross(self.s_j, j.A.T @ u)),)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        d = self.d0 + self.change(i, j)
-        d_t = (vj.v + j.A @ cross(vj.w, self.s_j)) - (vi.v + i.A @ cross(vi.w, self.s_i))
-        bent = j.A @ vj.centripetal(self.s_j) - i.A @ vi.centripetal(self.s_i)
-        return (-((d_t @ d_t + d @ bent) * (1.0 / self.length)),)
-
-
-Distance.paper = PaperDistance

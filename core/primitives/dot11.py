@@ -6,14 +6,6 @@ f, g, h are right-handed and unit; at design the frames of both bodies coincide.
     (14)  rows  = [ 0 | f_i | 0 | -f_i ], [ 0 | -g_i | 0 | g_i ]
     (16)  gamma = [ -s (g_i . w_i),  -s (f_i . w_i) ],      s = h . (w_j - w_i)
 
-The paper in body axes; the rows of body i are constant:
-
-    (13)  phi   = [ g . A_ij h,  f . A_ij h ]
-    (14)  rows  = [ 0 | f | 0 | -A_ij^T f ], [ 0 | -g | 0 | A_ij^T g ]
-    (16)  gamma = [ -s (g . w_i),  -s (f . w_i) ],      s = h . Om
-
-Conventional: the dot10 of (g, h) and of (f, h).
-
 (14) puts h_i for h_j in g_i x h_j = f_i and f_i x h_j = -g_i: exact where phi = 0 on the branch h_j
 = +h_i, and of the order of the misalignment off it, so Newton stays quadratic and reaches +h_i from
 any misalignment below 180 degrees; with the exact rows it fails beyond 67 degrees (90 with the
@@ -26,8 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, Vec3
-from .base import Pose, Primitive, Row, Twist, relative
-from .dot10 import ConventionalDot10
+from .base import Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -54,36 +45,3 @@ class Dot11(Primitive):
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (i.turn(self.h) @ j.turn(self.h),)
-
-    def conventional_form(self) -> tuple[Primitive, ...]:
-        return ParallelTest(self.g, self.h), ConventionalDot10(self.f, self.h)
-
-
-class PaperDot11(Dot11):
-    """Eqs (13)-(16) in body axes."""
-
-    body_axes = True
-
-    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        h_j = relative(i, j) @ self.h
-        return self.g @ h_j, self.f @ h_j
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        A_ji = relative(i, j).T
-        return Row(ZERO, self.f, ZERO, -(A_ji @ self.f)), Row(ZERO, -self.g, ZERO, A_ji @ self.g)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        s = self.h @ (relative(i, j) @ vj.w - vi.w)
-        return -(s * (self.g @ vi.w)), -(s * (self.f @ vi.w))
-
-
-class ParallelTest(ConventionalDot10):
-    """The first dot10 of a parallel pair, b = h: it also carries the pair's branch test, h_i . h_j
-    > 0.
-    """
-
-    def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return (self.b @ (relative(i, j) @ self.b),)
-
-
-Dot11.paper = PaperDot11

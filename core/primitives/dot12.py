@@ -8,13 +8,6 @@ With e the vector part of the Euler parameters of the rotation from body j to bo
     rows  = [ 0 | I | 0 | -I ]       literally constant; exact where phi = 0
     gamma = 0
 
-The paper in body axes, with the joint frame f, g, h along the body axes:
-
-    (17)       phi   = [ g_i . h_j, h_i . f_j, f_i . g_j ]
-    (18)-(21)  rows  = [ 0 | I | 0 | -A_ij ],      gamma = 0
-
-Conventional: the dot10 of (g, h), of (h, f) and of (f, g).
-
 The paper's residual (17), B_i [g_i . h_j, h_i . f_j, f_i . g_j], agrees with this to first order
 and has the same rows, but it is also zero at seven other rotations (turns of 180 and of 120
 degrees), all of them regular for exact rows. The Euler parameters vanish at coincidence only and
@@ -28,8 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, X, Y, Z
-from .base import Pose, Primitive, Row, Twist, relative
-from .dot10 import ConventionalDot10
+from .base import Pose, Primitive, Row, Twist
 
 
 @dataclass(frozen=True)
@@ -47,42 +39,3 @@ class Dot12(Primitive):
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return 0.0, 0.0, 0.0
-
-    def conventional_form(self) -> tuple[Primitive, ...]:
-        return LockTest(Y, Z), ConventionalDot10(Z, X), ConventionalDot10(X, Y)
-
-
-class PaperDot12(Dot12):
-    """Eqs (17)-(21) in body axes. The residual has seven spurious rotations; the branch test is
-    trace A_ij = 3.
-    """
-
-    steady = False
-    body_axes = True
-
-    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        A_ij = relative(i, j)
-        # with the joint frame along the body axes, f, g, h = x, y, z: g_i . h_j, h_i . f_j, f_i .
-        # g_j
-        return A_ij.y.z, A_ij.z.x, A_ij.x.y
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        A_ij = relative(i, j)
-        return tuple(
-            Row(ZERO, e, ZERO, -a) for e, a in zip((X, Y, Z), (A_ij.x, A_ij.y, A_ij.z), strict=True)
-        )
-
-    def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        A_ij = relative(i, j)
-        return (A_ij.x.x + A_ij.y.y + A_ij.z.z - 2.0,)  # 1 on the branch, -2 or -3 off it
-
-
-class LockTest(ConventionalDot10):
-    """The first dot10 of a lock: it also carries the lock's branch test, trace A_ij = 3."""
-
-    def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        A_ij = relative(i, j)
-        return (A_ij.x.x + A_ij.y.y + A_ij.z.z - 2.0,)
-
-
-Dot12.paper = PaperDot12

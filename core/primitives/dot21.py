@@ -10,14 +10,6 @@ origins, and a = A_i a0 for a0 = f, g:
           rows  = [ -a | a x e | a | 0 ]        exact for this phi everywhere
           gamma = -( (w_i x (w_i x a)) . e + 2 (w_i x a) . (v_j - v_i) )
 
-The paper in body axes, const-C, with y = A_i^T (r_j - r_i):
-
-    (23)  phi   = a . y - a . e0
-          rows  = [ -(A_i a) | a x y | A_i a | 0 ]
-          gamma = a . ( 2 w_i x A_i^T (v_j - v_i) - w_i x (w_i x y) )
-
-Conventional: dot20 between the body origins, with arms of zero.
-
 Only together with Dot12 of the same joint: the rows of the line constraint alone (Dot20) differ
 from these by multiples of the Dot12 rows. With the current A_ij in the residual, as the paper has
 it, the same rows take one or two Newton passes more and lose their basin for long arms; that form
@@ -30,7 +22,6 @@ from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, Vec3, cross
 from .base import Pose, Primitive, Row, Twist
-from .dot20 import ConventionalDot20
 
 
 @dataclass(frozen=True)
@@ -56,28 +47,3 @@ class Dot21(Primitive):
         e, e_t = self.e0 + (j.u - i.u), vj.v - vi.v
         turning = (cross(vi.w, i.turn(a)) for a in (self.f, self.g))
         return tuple(-(cross(vi.w, a_t) @ e + 2.0 * (a_t @ e_t)) for a_t in turning)
-
-    def conventional_form(self) -> tuple[Primitive, ...]:
-        return tuple(ConventionalDot20(a, ZERO, ZERO, self.e0) for a in (self.f, self.g))
-
-
-class PaperDot21(Dot21):
-    """Eq. (23) in body axes."""
-
-    body_axes = True
-
-    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        y = i.A.T @ (self.e0 + (j.u - i.u))
-        return tuple(a @ y - a @ self.e0 for a in (self.f, self.g))
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        y = i.A.T @ (self.e0 + (j.u - i.u))
-        return tuple(Row(-(i.A @ a), cross(a, y), i.A @ a, ZERO) for a in (self.f, self.g))
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        y, y_t = i.A.T @ (self.e0 + (j.u - i.u)), i.A.T @ (vj.v - vi.v)
-        turning = 2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y))
-        return tuple(a @ turning for a in (self.f, self.g))
-
-
-Dot21.paper = PaperDot21

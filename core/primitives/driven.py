@@ -5,16 +5,12 @@ Point coordinate along the global unit vector k, with S = A_j s (body i is the g
     phi   = k . (u_j + (A_j - I) s) - c       rows = [ 0 | 0 | k | S x k ]       nu = c_t
     gamma = c_tt - k . (w_j x (w_j x S))
 
-    body axes     rows = [ 0 | 0 | k | s x A_j^T k ]     gamma = c_tt - k . A_j (w_j x (w_j x s))
-
 Joint angle about h, on a joint whose axes are parallel, with the Euler parameters rho = conj(q_i)
 q_j of the relative rotation:
 
     phi   = 2 ( cos(c/2) h . vec(rho) - sin(c/2) rho_0 )  =  2 sin((theta - c)/2)
     rows  = [ 0 | -h | 0 | h ]       nu = c_t       gamma = c_tt
             exact where the axes are parallel and phi = 0
-
-    body axes     rows = [ 0 | -h | 0 | h ], constant: h is the same in both bodies
 
 sin(theta - c) has a second zero at c + pi, atan2 needs unwrapping and cos(theta) - cos(c) is
 singular at 0 and pi; the half angle has none of these, because Euler parameters that are followed
@@ -84,27 +80,3 @@ class DrivenAngle(Primitive):
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.drive.c_t,)
-
-
-class PaperDrivenCoordinate(DrivenCoordinate):
-    """The rows in body axes."""
-
-    body_axes = True
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        return (Row(ZERO, ZERO, self.k, cross(self.s, j.A.T @ self.k)),)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        return (self.drive.c_tt - self.k @ (j.A @ vj.centripetal(self.s)),)
-
-
-class PaperDrivenAngle(DrivenAngle):
-    """The rows in body axes."""
-
-    body_axes = True
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        return (Row(ZERO, -self.h, ZERO, self.h),)
-
-
-DrivenCoordinate.paper, DrivenAngle.paper = PaperDrivenCoordinate, PaperDrivenAngle

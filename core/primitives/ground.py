@@ -31,12 +31,3 @@ class Ground(Primitive):
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return (0.0,) * 6
-
-
-class PaperGround(Ground):
-    """The same rows, in body axes."""
-
-    body_axes = True
-
-
-Ground.paper = PaperGround

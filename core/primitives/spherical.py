@@ -6,18 +6,13 @@ that nothing large cancels:
     (24)  phi   = d0 + (u_j + (A_j - I) s_j) - (u_i + (A_i - I) s_i)
           rows  = [ -I | skew(A_i s_i) | I | -skew(A_j s_j) ]        exact everywhere
           gamma = w_i x (w_i x A_i s_i) - w_j x (w_j x A_j s_j)
-
-The paper in body axes:
-
-          rows  = [ -I | A_i skew(s_i) | I | -A_j skew(s_j) ]
-          gamma = A_i (w_i x (w_i x s_i)) - A_j (w_j x (w_j x s_j))
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import ZERO, Mat3, Scalar, Vec3, X, Y, Z, cross
+from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross
 from .base import Pose, Primitive, Row, Twist
 
 
@@ -41,25 +36,3 @@ class Spherical(Primitive):
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return tuple(vi.centripetal(i.turn(self.s_i)) - vj.centripetal(j.turn(self.s_j)))
-
-
-class PaperSpherical(Spherical):
-    """Rows of (24) in body axes."""
-
-    body_axes = True
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        blocks = zip((X, Y, Z), _arm_rows(i.A, self.s_i), _arm_rows(j.A, self.s_j), strict=True)
-        return tuple(Row(-e, b_i, e, -b_j) for e, b_i, b_j in blocks)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        return tuple(i.A @ vi.centripetal(self.s_i) - j.A @ vj.centripetal(self.s_j))
-
-
-def _arm_rows(A: Mat3, s: Vec3) -> tuple[Vec3, Vec3, Vec3]:
-    """Return the rows of A skew(s)."""
-    # row k of A, times skew(s), is a_k x s
-    return cross(A.x, s), cross(A.y, s), cross(A.z, s)
-
-
-Spherical.paper = PaperSpherical

@@ -14,10 +14,10 @@ from rich.text import Text
 
 from ..case.case import PER_TRAVEL
 from ..case.io.escape import visible
-from ..case.units import ANGLES, LENGTHS
 from ..errors import shortened
+from ..harness.labels import DRIVER_UNITS, displayed, driver_unit
 from ..harness.record import Facts, Outcome, Record, Results
-from ..unit_text import unit_text, value_text, with_unit
+from ..unit_text import value_text, with_unit
 from . import terminal
 
 # a figure's width in pixels; longer series are thinned, but keep their worst samples
@@ -33,25 +33,6 @@ DISPLAY = {
     "m/m": ("mm/m", 1e3),
 }
 """Display unit and factor by the unit of results."""
-
-DRIVER_UNITS = {
-    "point_coordinate": "m",
-    "joint_displacement": "m",
-    "joint_angle": "rad",
-    "time": "s",
-}
-"""SI unit of the values of a driver, by its type."""
-
-
-def in_table_units(unit: str, facts: Facts) -> tuple[str, float]:
-    """Return the name of an SI unit in the units of a case of hardpoints, and its size [SI]. Rates
-    of change per metre stay per metre, and forces and torques in N and N m.
-    """
-    units = {"m": LENGTHS[facts["units"]["length"]], "rad": ANGLES[facts["units"]["angle"]]}
-    measure, *per = unit.split("/", 1)
-    found = units.get(measure)
-    return ("/".join([found.name, *per]), found.size) if found else (unit, 1.0)
-
 
 # Directions in files are exact, or have the three digits of a table, which this tolerance allows.
 ALONG = 1 - 1e-5
@@ -225,7 +206,7 @@ def events(record: Record, facts: Facts) -> dict[str, int]:
         facts: of the case, with the units of its table.
     """
     name, travel = next(iter(record.driver.items()))
-    unit, scale = _display_unit(DRIVER_UNITS.get(facts["driver"].get("type", ""), ""), facts)
+    unit, scale = displayed(driver_unit(facts), facts)
     low, high = (pick(range(len(travel)), key=travel.__getitem__) for pick in (min, max))
     design = min(range(len(travel)), key=lambda k: abs(travel[k]))
     ends = ("rebound", "jounce") if name.endswith("stroke") else ("least", "most")
@@ -240,19 +221,14 @@ def _rows(
     for name, series in record.outputs.items():
         if name.removeprefix("left_").removeprefix("right_") not in NAMES or not series.position:
             continue
-        unit, scale = _display_unit(series.unit, facts)
+        unit, scale = displayed(series.unit, facts)
         cells = [number(series.position[k], scale) for k in samples]
         per = record.outputs.get(name + PER_TRAVEL)
         gradient, per_unit = "", ""
         if per is not None and per.position:
-            per_unit, factor = _display_unit(per.unit, facts)
+            per_unit, factor = displayed(per.unit, facts)
             gradient = number(per.position[design], factor)
         yield visible(with_unit(name, unit)), *cells, gradient, per_unit
-
-
-def _display_unit(unit: str, facts: Facts) -> tuple[str, float]:
-    text, size = in_table_units(unit, facts)
-    return unit_text(text).replace("deg", "\N{DEGREE SIGN}"), 1.0 / size
 
 
 def number(value: float | None, scale: float = 1.0) -> str:

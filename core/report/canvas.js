@@ -23,7 +23,8 @@ function cameraOf({ azimuth, elevation, zoom, pan = [0, 0] }, bounds, width, hei
   const up = [-se * ca, -se * sa, ce];
   const near = [ce * ca, ce * sa, se];
   const reach = (axis) => Math.max(bounds.reach(axis), 0.05 * bounds.size);
-  const fit = Math.min((width / 2 - 60) / reach(right), (height / 2 - 34) / reach(up));
+  const margin = Math.min(60, 0.1 * width); // for names
+  const fit = Math.min((width / 2 - margin) / reach(right), (height / 2 - 34) / reach(up));
   const scale = zoom * fit;
   const turn = (vector) => [
     scale * dot(right, vector),

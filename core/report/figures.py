@@ -207,6 +207,7 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 def error_figure(
     motion: str,
     unit: str,
+    factor: float,
     axis: Axis,
     curves: Sequence[tuple[Style, Values, Deviation]],
     standard: Values,
@@ -218,7 +219,7 @@ def error_figure(
     `layout.meta.floor`.
 
     Args:
-        unit: unit of the errors.
+        unit, factor: unit of the errors on the page, and the factor to it from SI.
         curves: at least one judged engine, each with its deviations.
         standard: the values of the standard.
     """
@@ -228,7 +229,7 @@ def error_figure(
             None if a is None or b is None else abs(a - b)
             for a, b in zip(values, standard, strict=True)
         ]
-        errors = drawn_values(off, axis.kept, 1.0)
+        errors = drawn_values(off, axis.kept, factor)
         # three digits suffice for an error, and keep the page small
         rounded = [None if e is None else float(f"{e:.2e}") for e in errors]
         curve = style.curve("driver", rounded, width=1.2, size=5)
@@ -236,10 +237,10 @@ def error_figure(
         traces.append(curve)
     worst = max((deviation for *_, deviation in curves), key=lambda deviation: deviation.max_abs)
     if worst.worst_step < len(axis.values) and 0 < worst.max_abs < math.inf:
-        place = {"x": [axis.scale * axis.values[worst.worst_step]], "y": [worst.max_abs]}
+        place = {"x": [axis.scale * axis.values[worst.worst_step]], "y": [factor * worst.max_abs]}
         ring = _marks("worst", "worst", 15, "circle-open", "#7f7f7f", 2)
         traces.append({"type": "scatter", **place, **ring})
-    tolerance = worst.tolerance
+    tolerance = factor * worst.tolerance
     positive = [e for trace in traces for e in trace["y"] if e]
     ends = positive + ([tolerance] if tolerance else [])
     low, high = min(positive, default=(tolerance or 1e-9) * 1e-6), max(ends, default=1.0)

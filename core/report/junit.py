@@ -18,10 +18,11 @@ from ..harness.labels import (
     notes,
     suspects,
 )
-from ..harness.record import REFERENCE, Deviations, Outcome, Record, Results
+from ..harness.record import REFERENCE, Deviations, Facts, Outcome, Record, Results
 from ..history.findings import Kind, Regressions
 from ..history.store import Pair
 from ..unit_text import motion_word
+from .regressions import TITLES
 
 COUNTS = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -56,7 +57,8 @@ def to_junit(results: Results) -> bytes:
                 warm = record.seconds.warm if record.seconds else None
                 for output, deviations in record.errors.items():
                     test = _test(suite, record.pair, output, warm or 0.0)
-                    verdict, message = _verdict(record, output, deviations)
+                    facts = results.run.get("cases", {}).get(case, {})
+                    verdict, message = _verdict(record, output, deviations, facts)
                     if verdict:
                         ElementTree.SubElement(test, verdict, message=message + suspicion)
                     _write(test, _numbers(record, output, deviations))
@@ -113,7 +115,7 @@ def _test(
     return ElementTree.SubElement(suite, "testcase", place)
 
 
-def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:
+def _verdict(record: Record, output: str, deviations: Deviations, facts: Facts) -> tuple[str, str]:
     """Return the element of a test case (none if it passed) and its message."""
     if record.outcome in (Outcome.UNJUDGED, Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
         return "skipped", f"{record.outcome.shown}: {record.message}"
@@ -121,7 +123,7 @@ def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, 
         (driver, values), *_ = record.driver.items()
         unit = record.outputs[output].unit
         off = [
-            describe(output, quantity, each, driver, values, unit)
+            describe(output, quantity, each, driver, values, unit, facts)
             for quantity, each in deviations.items()
             if not each.within
         ]
@@ -162,7 +164,9 @@ def to_regression_junit(results: Results, found: Regressions) -> bytes:
         if (place, name) not in tests:
             tests[place, name] = _test(suites[finding.case], finding.pair, name)
         test = tests[place, name]
-        message = FORBIDDEN.sub("\ufffd", f"{finding.kind}: {finding.message}")
+        message = FORBIDDEN.sub(
+            "\ufffd", f"{TITLES.get(finding.kind, finding.kind)}: {finding.message}"
+        )
         verdict = test.find("failure")
         if verdict is None:
             verdict = ElementTree.SubElement(test, "failure")

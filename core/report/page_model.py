@@ -6,13 +6,22 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from ..case.case import Truth
 from ..harness.engine import STANDARD
-from ..harness.labels import against, engine_name, motion_unit, number, output_label, product
+from ..harness.labels import (
+    against,
+    displayed,
+    engine_name,
+    motion_unit,
+    output_label,
+    product,
+    shown_text,
+)
 from ..harness.record import Deviation, Evidence, Facts, OutputSeries, Record, Results
 from ..trajectory import QUANTITIES
-from ..unit_text import FORCES, motion_word, value_text
+from ..unit_text import FORCES, motion_word
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
 from .figures import (
@@ -42,6 +51,7 @@ class Judged:
     output: str
     motion: str
     deviation: Deviation
+    facts: Facts = field(default_factory=dict[str, Any])
 
     @property
     def ratio(self) -> float:
@@ -59,11 +69,19 @@ class Judged:
         series = self.record.outputs.get(self.output)
         return motion_unit(series.unit, self.motion) if series else ""
 
+    def text(self, value: float) -> str:
+        """Return an error or a tolerance with its unit, that of the case's table if it has one."""
+        return shown_text(value, self.unit, self.facts)
 
-def deviations_of(records: Sequence[Record]) -> list[Judged]:
-    """Return every deviation of the records."""
+
+def deviations_of(records: Sequence[Record], facts: Facts | None = None) -> list[Judged]:
+    """Return every deviation of the records.
+
+    Args:
+        facts: of their cases, by name.
+    """
     return [
-        Judged(r, output, motion, d)
+        Judged(r, output, motion, d, (facts or {}).get(r.case, {}))
         for r in records
         for output, e in r.errors.items()
         for motion, d in e.items()
@@ -75,9 +93,11 @@ def worst(deviations: Iterable[Judged]) -> Judged | None:
     return max(deviations, key=lambda each: each.ratio, default=None)
 
 
-def worst_of(record: Record, motion: str | None = None) -> Judged | None:
-    """Return the worst deviation of a record, in one motion or any."""
-    return worst(each for each in deviations_of([record]) if motion in (None, each.motion))
+def worst_of(
+    record: Record, motion: str | None = None, facts: Facts | None = None
+) -> Judged | None:
+    """Return the worst deviation of a record, in one motion or any; see `deviations_of`."""
+    return worst(each for each in deviations_of([record], facts) if motion in (None, each.motion))
 
 
 @dataclass(frozen=True)
@@ -167,7 +187,7 @@ def case_view(given: Material, name: str, anchor: str) -> CaseView:
     results = given.results
     records = [record for record in results.records if record.case == name]
     facts: Facts = results.run.get("cases", {}).get(name, {})
-    deviations = deviations_of(records)
+    deviations = deviations_of(records, {name: facts})
     axis = driver_axis(facts, records, (each.deviation.worst_step for each in deviations))
     names = dict.fromkeys(output for record in records for output in record.outputs)
     outputs: list[OutputView] = []
@@ -232,7 +252,8 @@ def _output(
         title = f"{word} difference of {label} against {axis.name}, log axis"
         compared.append(motion)
         errors.append(Plot(f"{key}-{motion}", title, _worst_caption(here, axis)))
-        given.figures[f"{key}-{motion}"] = error_figure(motion, here[0].unit, axis, found, values)
+        unit = displayed(here[0].unit, here[0].facts)
+        given.figures[f"{key}-{motion}"] = error_figure(motion, *unit, axis, found, values)
     positions = [each for each in deviations if each.motion == "position"]
     standard = _standard(positions, records, references)
     band = (standard, positions[0].deviation.tolerance) if standard else None
@@ -241,7 +262,9 @@ def _output(
         f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)
     ]
     sentences += [] if truth else ["No reference."]
-    sentences += [_band_caption(*band, against(positions[0].deviation.against))] if band else []
+    if band:
+        whose = against(positions[0].deviation.against)
+        sentences.append(_band_caption(*band, positions[0].text(band[1]), whose))
     plot = Plot(
         key,
         f"{label} against {axis.name}, all engines",
@@ -307,9 +330,8 @@ def _standard(
     return engines.get(standard) or references.get(output)
 
 
-def _band_caption(standard: OutputSeries, tolerance: float, whose: str) -> str:
+def _band_caption(standard: OutputSeries, tolerance: float, held: str, whose: str) -> str:
     band = "narrower than the line" if band_is_thin(standard, tolerance) else "the grey band"
-    held = value_text(number(tolerance), standard.unit)
     return f"Tolerance ±{held} around the {whose}: {band}."
 
 
@@ -317,5 +339,5 @@ def _worst_caption(deviations: Sequence[Judged], axis: Axis) -> str:
     largest = max(deviations, key=lambda each: each.deviation.max_abs)
     d = largest.deviation
     who = f"{engine_name(largest.record)}, sample {d.worst_step} ({axis.at(d.worst_step)})"
-    found, tolerance = (value_text(number(size), largest.unit) for size in (d.max_abs, d.tolerance))
+    found, tolerance = map(largest.text, (d.max_abs, d.tolerance))
     return f"Worst {found}: {who}. Tolerance {tolerance}, against {against(d.against)}."

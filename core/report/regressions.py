@@ -16,9 +16,15 @@ from rich.text import Text
 from ..case.io.escape import visible
 from ..doors import offers
 from ..errors import number_of, shortened
-from ..harness.labels import motion_unit, number, product, unread_count
+from ..harness.labels import (
+    folded,
+    motion_unit,
+    number,
+    product,
+    shown_change,
+    unread_count,
+)
 from ..history.findings import WHY, Accepted, Finding, Kind, Loose, Regressions, Step
-from ..unit_text import value_text
 from . import terminal
 from .sections import environment
 from .table import escape_markdown, row
@@ -35,12 +41,32 @@ NAMED = 4
 COUNTED: Mapping[Kind, str] = {
     Kind.LOST: "with something lost",
     Kind.GONE: "with values gone",
+    Kind.MOVED: "with other values",
     Kind.FREEDOM: "with another dof",
     Kind.UNIT: "with another unit",
     Kind.DRIFTED: "less accurate",
     Kind.RESIDUAL: "with a larger residual",
 }
 """Words after the number of pairs with a finding, if they differ from the name of the kind."""
+
+
+TITLES: Mapping[Kind, str] = {Kind.MOVED: "other values"}
+"""Title of a group of findings, if it differs from the name of the kind."""
+
+
+def heading(found: Regressions, kind: Kind) -> tuple[str, str]:
+    """Return the title of a group of findings, and why it matters, as far as the versions tell."""
+    why = WHY[kind]
+    if kind is Kind.MOVED:
+        since = dict.fromkeys(
+            str(change)
+            for each in found.findings
+            if each.kind is kind
+            for change in each.changes or found.changes
+            if change.what == each.engine
+        )
+        why = f"the values differ since {', '.join(since)}" if since else why
+    return TITLES.get(kind, kind), why
 
 
 @dataclass(frozen=True)
@@ -64,10 +90,15 @@ class Row:
         return shortened(self.cases, NAMED)
 
     @property
-    def what(self) -> str:
-        """The message, and the number of further findings of the pair."""
+    def about(self) -> str:
+        """The number of further findings of the pair, and the first run; empty without any."""
         since = f" · since run {self.since}" if self.since is not None else ""
-        return self.message + (f" · and {self.more} more like it" if self.more else "") + since
+        return (f" · and {self.more} more like it" if self.more else "") + since
+
+    @property
+    def what(self) -> str:
+        """The message, folded, and what is known about it."""
+        return folded(self.message) + self.about
 
 
 def headline(found: Regressions) -> str:
@@ -213,8 +244,8 @@ def step_says(step: Step) -> str:
     elif step.quantity == "time":
         what = f"{number(1e3 * step.before)} → {number(1e3 * step.now)} ms a sweep"
     else:
-        unit = motion_unit(step.unit, step.quantity)
-        what = f"{number(step.before)} → {value_text(number(step.now), unit)}"
+        unit, facts = motion_unit(step.unit, step.quantity), {"units": step.units}
+        what = shown_change(step.before, step.now, unit, facts if step.units else {})
     changed = ", ".join(map(str, step.changes)) or "no version, machine or commit changed there"
     repaired = f", repaired in run {step.repaired}" if step.repaired is not None else ""
     since = f"since run {step.first} ({step.started[:16].replace('T', ' ')}){repaired}"
@@ -250,7 +281,7 @@ def to_markup(found: Regressions) -> Markup:
     groups = [
         (
             kind,
-            WHY[kind],
+            *heading(found, kind),
             len(pairs(found, kind)),
             rows(each for each in found.findings if each.kind is kind),
         )
@@ -262,7 +293,7 @@ def to_markup(found: Regressions) -> Markup:
         .render(
             headline=headline(found),
             found=found,
-            groups=[group for group in groups if group[2]],
+            groups=[group for group in groups if group[3]],
             steps=lists(found),
             passed_by=passed_by_says(found),
             accepted=[accepted_says(each) for each in found.accepted],
@@ -286,7 +317,8 @@ def _lines(found: Regressions) -> Iterator[str]:
         if not group:
             continue
         folded = not found.fails(kind) and kind not in (Kind.FIXED, Kind.JUDGED)
-        title = f"{kind.capitalize()} ({len(pairs(found, kind))}): {WHY[kind]}"
+        name, why = heading(found, kind)
+        title = f"{name.capitalize()} ({len(pairs(found, kind))}): {why}"
         yield from (
             [f"<details><summary>{escape_markdown(title)}</summary>", ""]
             if folded
@@ -335,7 +367,8 @@ def print_regressions(found: Regressions, file: TextIO) -> None:
         if not group:
             continue
         _print_line(console, "")
-        title = f"{kind} ({len(pairs(found, kind))}): {WHY[kind]}"
+        name, why = heading(found, kind)
+        title = f"{name} ({len(pairs(found, kind))}): {why}"
         _print_line(console, title, "bold red" if found.fails(kind) else "bold")
         table = terminal.columns("engine", "case", "what")
         for each in group[:LONGEST]:

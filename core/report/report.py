@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -179,7 +180,9 @@ def render(given: Material, changes: Markup | None = None) -> str:
     cases = [case_view(given, name, f"case-{index}") for index, name in enumerate(names)]
     curves = downloads(given.results, {each.anchor: each.name for each in cases if each.outputs})
     templates = environment()
-    cast("dict[str, Any]", templates.filters).update(model=_model, worst=worst_of)
+    cast("dict[str, Any]", templates.filters).update(
+        model=_model, worst=partial(worst_of, facts=given.results.run.get("cases", {}))
+    )
     return templates.get_template("report.html").render(
         headline=headline(given.results),
         changes=changes,

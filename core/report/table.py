@@ -17,6 +17,8 @@ from ..errors import labelled
 from ..harness.labels import (
     account,
     against,
+    displayed,
+    folded,
     motion_unit,
     notes,
     shorten_names,
@@ -112,8 +114,9 @@ def print_outputs(results: Results, file: TextIO) -> None:
     for record in results.records:
         for name, errors in record.errors.items():
             unit = record.outputs[name].unit if name in record.outputs else LENGTH
-            cells = (_of_tolerance(getattr(errors, quantity)) for quantity in QUANTITIES)
-            cells = Text(visible(name)), *cells, Text(visible(unit))
+            shown, factor = displayed(unit, results.run.get("cases", {}).get(record.case, {}))
+            cells = (_of_tolerance(getattr(errors, quantity), factor) for quantity in QUANTITIES)
+            cells = Text(visible(name)), *cells, Text(visible(shown or unit))
             rows.append(((record.case, record.engine), cells))
     # the first error of forces, which have no position, is called value
     words = {motion_word(QUANTITIES[0], cells[-1].plain) for _, cells in rows} or {QUANTITIES[0]}
@@ -160,10 +163,10 @@ def print_summary(results: Results, file: TextIO) -> None:
     print_messages(results, terminal.console(file))
 
 
-def _of_tolerance(error: Deviation | None) -> Text:
+def _of_tolerance(error: Deviation | None, factor: float) -> Text:
     if error is None:
         return Text("–")
-    text = f"{error.max_abs:.1e} of {error.tolerance:.0e}"
+    text = f"{factor * error.max_abs:.1e} of {factor * error.tolerance:.0e}"
     return Text(text, style="" if error.within else "bold red")
 
 
@@ -239,7 +242,8 @@ def print_messages(results: Results, console: Console) -> None:
         if outcome is Outcome.UNAVAILABLE:
             absent.setdefault(message.removeprefix(f"{engine} is "), []).append(engine)
         else:
-            said.append(f"{outcome.shown}: {shorten_names(cases)} · {engine}: {message}")
+            whose = f"{outcome.shown}: {shorten_names(cases)} · {engine}"
+            said.append(f"{whose}: {folded(message)}")
     said += [f"{Outcome.UNAVAILABLE}: {shorten_names(each)}: {why}" for why, each in absent.items()]
     for line in said:
         console.print(Text(visible(line, also="\n\t")), soft_wrap=True)
@@ -378,7 +382,7 @@ def to_markdown(results: Results) -> str:
     lines += [escape_markdown(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
         escape_markdown(
-            f"{outcome.shown.capitalize()}: {shorten_names(cases)} in {engine}: {message}."
+            f"{outcome.shown.capitalize()}: {shorten_names(cases)} in {engine}: {folded(message)}."
         )
         for (engine, outcome, message), cases in messages(results).items()
         if outcome is not Outcome.PASS

@@ -151,7 +151,7 @@ BROKEN = {
     "no sweep": ((BASE[BASE.index("[sweep]") : BASE.index("[outputs")], ""), "sweep ... missing"),
     "no point": (
         ('[points.tip]\nbody = "slider"\nposition = [1.5, 2.0, 3.0]', ""),
-        "outputs.tip_x.point ... found 'tip', expected a point; known: none",
+        "outputs.tip_x.point ... found 'tip', expected a point; there is none here: define it",
     ),
     "output of nothing": (
         ('point = "tip"', 'point = "top"'),

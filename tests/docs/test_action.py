@@ -11,7 +11,14 @@ from ..support.case_texts import BASE, INLINE
 from ..support.sources import ROOT
 
 ACTION = yaml.safe_load((ROOT / ".github/actions/kincheck/action.yml").read_text("utf-8"))
-STEPS = [each["run"] for each in ACTION["runs"]["steps"] if "run" in each][1:]
+INSTALL, *STEPS = (each["run"] for each in ACTION["runs"]["steps"] if "run" in each)
+PYTHON = f"""#!/bin/sh
+case "$2" in
+  venv) mkdir -p "$3/bin" && cp "$0" "$3/bin/python" ;;
+  pip) echo "$@" >> "$RUNNER_TEMP/installed" ;;
+  *) exec {sys.executable} "$@" ;;
+esac
+"""
 
 
 @pytest.fixture
@@ -49,3 +56,23 @@ def test_github_action_fails_after_regression(job, tmp_path):
     status, output, summary = job(cases="slider.toml", engines="", options="--engine native -q")
     assert (status, output) == (1, "status=1")
     assert "1 new failure" in summary
+
+
+def test_github_action_installs_by_lock(tmp_path):
+    program = tmp_path / "bin" / "python"
+    program.parent.mkdir()
+    program.write_text(PYTHON)
+    program.chmod(0o755)
+    environment = os.environ | {
+        "PATH": f"{program.parent}:{os.environ['PATH']}",
+        "RUNNER_TEMP": str(tmp_path),
+        "GITHUB_ACTION_PATH": str(ROOT / ".github/actions/kincheck"),
+        "EXTRAS": "fast,usd",
+        "INSTALL": "python -m pip install .\npython -m pip install ./mine",
+    }
+    subprocess.run(["bash", "-e", "-c", INSTALL], cwd=tmp_path, env=environment, check=True)
+    _, lock, rest, *own = (tmp_path / "installed").read_text().splitlines()
+    assert "--require-hashes" in lock
+    assert "llvmlite==" in (tmp_path / "kincheck.lock").read_text()
+    assert rest.endswith("[fast,usd]")  # what the lock lacks, in its newest version
+    assert own == ["-m pip install .", "-m pip install ./mine"]

@@ -4,6 +4,7 @@ damaged, never the others.
 
 import json
 import sqlite3
+from contextlib import closing
 
 import pytest
 from kincheck.core.cli.main import main
@@ -112,14 +113,35 @@ def test_history_of_damaged_pages(kincheck_main, path, capsys, change):
         status = kincheck_main("run crank --quiet --history", path)
         said = capsys.readouterr().err
         if "; the run is not in the history: say --out DIR to keep it" in said:
-            # beyond the head, which counts who has opened it
-            assert (status, path.read_bytes()[100:]) == (2, before[100:]), begin
-            assert not path.with_name(f"{path.name}-wal").exists()
+            assert (status, path.read_bytes()) == (2, before), begin
         elif status == 2:
             assert "cannot be read" in said
         else:
             assert main(["report", "--history", str(path)]) < 2, begin
+        assert [*path.parent.glob(f"{path.name}-*")] == []
         capsys.readouterr()
+
+
+@pytest.mark.parametrize("command", ["report", "history"])
+def test_damaged_history_is_only_read(path, capsys, command):
+    """The states of its runs are not stored yet; a sound file gets them."""
+    for begin in pages(path, lambda page: page[:300] + page[300:][::-1]):
+        before = path.read_bytes()
+        with closing(sqlite3.connect(path)) as reader:
+            damaged = reader.execute("PRAGMA quick_check(1)").fetchone() != ("ok",)
+        main([command, "--history", str(path)])
+        assert not damaged or path.read_bytes() == before, begin
+        assert [*path.parent.glob(f"{path.name}-*")] == []
+    capsys.readouterr()
+    path.unlink()
+    nights(path, 2)
+    before = path.read_bytes()
+    assert main([command, "--history", str(path)]) == 0
+    assert [*path.parent.glob(f"{path.name}-*")] == []
+    with Store(path, writable=False) as store:
+        (count,) = store.connection.execute("SELECT count(*) FROM states").fetchone()
+    assert path.read_bytes() != before
+    assert count == 8
 
 
 DAMAGE = {

@@ -199,7 +199,7 @@ def test_changed_tolerance_is_reported(path):
 
     keep_changed(path, errors=loosened)
     (finding,) = reported(path).findings
-    assert (finding.kind, finding.message) == (Kind.TOLERANCE, "x position: 1e-9 → 1e-6")
+    assert (finding.kind, finding.message) == (Kind.TOLERANCE, "x position: 1e-9 → 1e-6 m")
 
 
 def test_changed_reference_is_reported(tmp_path, capsys):

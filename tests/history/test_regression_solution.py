@@ -7,9 +7,20 @@ import re
 import pytest
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.findings import WHY, Kind
+from kincheck.core.report.regressions import to_markdown
+from kincheck.core.trajectory import QUANTITIES
 from msgspec.structs import replace
 
-from ..support.history_runs import FIRST, keep, keep_changed, nights, records, report, reported
+from ..support.history_runs import (
+    FIRST,
+    changed,
+    keep,
+    keep_changed,
+    nights,
+    records,
+    report,
+    reported,
+)
 from ..support.printed import junit_messages
 
 
@@ -190,3 +201,48 @@ def test_missing_pairs_without_baseline(path, capsys):
     assert report(path) == 0
     assert "nothing regressed; 1 fixed; 2 not in this run" in capsys.readouterr().out
     assert report(path, "--missing-is-failure") == 1
+
+
+@pytest.mark.parametrize(
+    ("version", "told"),
+    [
+        ("4.1.0", "the values differ since mujoco 4.0.0 → 4.1.0"),
+        ("4.0.0", "the case, its solution or its assembly has changed"),
+    ],
+)
+def test_changed_values_name_the_version(path, version, told):
+    nights(path, 1)
+    none = dict.fromkeys(QUANTITIES)
+    unjudged = {"errors": lambda errors: errors | {"x": replace(errors["x"], **none)}}
+    outputs = of_output(position=lambda values: [x + 1e-3 for x in values])
+    now = changed(records(), **unjudged, **outputs, version=version)
+    keep(path, now, engines={"native": "0.1.0", "mujoco": version})
+    page = to_markdown(reported(path))
+    assert "Other values (1): " in page
+    assert told in page
+
+
+def test_failed_values_are_no_other_motion(path):
+    """An error that is out of tolerance is a failure, whatever caused it."""
+    nights(path, 1)
+    far = {**of_output(position=lambda values: [x + 1e-3 for x in values])}
+
+    def failed(errors):
+        off = replace(errors["x"].position, max_abs=1e-3, within=False)
+        return errors | {"x": replace(errors["x"], position=off)}
+
+    keep_changed(path, **far, errors=failed, outcome=Outcome.FAIL, message="x is off")
+    assert [each.kind for each in reported(path).findings] == [Kind.FAILURE]
+
+
+def test_long_message_is_folded(path, capsys):
+    nights(path, 1)
+    message = "\n".join(f"line {k}" for k in range(50))
+    keep_changed(path, outcome=Outcome.ERROR, message=message)
+    json, page = path.with_name("r.json"), path.with_name("report.html")
+    report(path, "--json", json, "--out", path.parent)
+    shown = capsys.readouterr().out
+    assert "46 lines more, all in the JSON" in shown
+    assert "line 3 " not in shown
+    assert all(f"line {k}\\n" in json.read_text() for k in range(49))
+    assert page.read_text().count("<summary>more</summary>") >= 1

@@ -24,7 +24,7 @@ from kincheck.core import (
 from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
-from kincheck.core.kinematics import Style
+from kincheck.core.kinematics import styles
 from kincheck.core.trajectory import QUANTITIES
 
 TILT, RATIO, RATE = 0.3, -1.5, 2.0
@@ -95,7 +95,7 @@ def case(request):
     )
 
 
-@pytest.mark.parametrize("style", Style)
+@pytest.mark.parametrize("style", styles())
 def test_planar_turn_in_row_styles(case, style):
     found = solve(case.mechanism, "turn", TURNS, rate=RATE, style=style)
     assert found.solved.all(), found.message

@@ -312,10 +312,10 @@ import sys
 from kincheck import cases
 from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.kinematics.formulation.styles import styles
 
 case = cases.load("mcpherson_strut")
-for style in Style:
+for style in styles():
     request = Request(tuple(case.sweep.path.motions), tuple(case.points), style=style)
     compiled_model._trace(case.mechanism, request, None, 4)
 for name, module in sys.modules.items():

@@ -17,7 +17,7 @@ from kincheck.core import (
     Revolute,
     solve,
 )
-from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.kinematics.formulation.styles import styles
 
 from ..support.mechanisms import ORIGIN, Z, circles_meet, planar_four_bar, solve_all
 
@@ -225,13 +225,13 @@ def side_of_the_line(pin, rest, turn, found):
     return across[:, 0] * d[:, 1] - across[:, 1] * d[:, 0]
 
 
-STYLES = [style.value for style in Style]
-# Each kite with both linkages, and with three of the styles, two of which are always the native and
-# the relative one.
+STYLES = styles()
+# Each kite with both linkages, and with three of the styles, two of which are always the first and
+# the last one.
 CHOSEN = [
     (name, ("universals", "hinges")[(row + column) % 2], style)
     for row, name in enumerate(NEARLY_KITES)
-    for column, style in enumerate(("native", STYLES[1 + row % 3], "relative"))
+    for column, style in enumerate((STYLES[0], STYLES[1 + row % (len(STYLES) - 1)], STYLES[-1]))
 ]
 
 
@@ -252,7 +252,7 @@ def test_chosen_rows_do_not_hide_corner(name, ends, style):
 
 @pytest.mark.parametrize(
     ("ends", "beside", "style"),
-    latin(["universals", "hinges"], [1e-2, -3e-3, 1e-3], ["native", "relative"]),
+    latin(["universals", "hinges"], [1e-2, -3e-3, 1e-3], [STYLES[0], STYLES[-1]]),
 )
 def test_nearly_singular_kite_exchanges_rows(ends, beside, style):
     """Those that were chosen at design depend on each other where it lies flat, or so nearly that
@@ -272,7 +272,7 @@ def test_nearly_singular_kite_exchanges_rows(ends, beside, style):
     [
         (count, style)
         for k, count in enumerate([4, 7, 8, 10, 12, 15])
-        for style in ("native", STYLES[1 + k % 4])
+        for style in (STYLES[0], STYLES[1 + k % (len(STYLES) - 1)])
     ],
 )
 def test_small_loop_does_not_hide_corner(count, style):

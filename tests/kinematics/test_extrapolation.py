@@ -9,9 +9,7 @@ import pytest
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import (
     ACCEPT,
-    EARLIER,
     FROM,
-    PREDICTED,
     RATE,
     RATE_T,
     TIME,
@@ -132,30 +130,20 @@ def test_extrapolation_by_several_vectors(lanes, order, interpreted, monkeypatch
 
 
 @pytest.mark.parametrize("order", [0, 2])
-def test_extrapolation_carries_no_earlier_step(order):
-    """Neither rates, nor what was predicted: where lanes are predicted after all, the step before
-    is none.
-    """
+def test_extrapolation_carries_no_rates(order):
     found = compile_model(
         mcpherson(), Request(("stroke",), ("wheel",), order=order, compiled=False)
     )
     slots, vectors, plan = found.slots, found.vectors, found.plan
-    ahead = [RATE, RATE_T, *(PREDICTED + name for name in found.state)]
-    left_out = {slot for name in ahead for slot in vectors[FROM + name]}
+    left_out = {slot for name in (RATE, RATE_T) for slot in vectors[FROM + name]}
     assert {target for _, target in plan.continued} == {
         target for _, target in plan.carried
     } - left_out
-    now = {slots[TIME]: slots[FROM + TIME], slots[FROM + TIME]: slots[EARLIER + TIME]}
-    assert {*now.items()} <= {*plan.carried}
-    assert {(slots[TIME], slots[FROM + TIME]), (slots[TIME], slots[EARLIER + TIME])} <= {
-        *plan.continued
-    }
+    assert (slots[TIME], slots[FROM + TIME]) in {*plan.continued}
     # what stands in the last lane `extrapolate` puts out itself
     puts = plan.programs["extrapolate"].outputs
     assert {*plan.moves} == {pair for pair in plan.continued if pair[1] not in puts}
-    assert {target for _, target in plan.moves} == {
-        slots[name] for name in (FROM + TIME, EARLIER + TIME, *ACCEPT)
-    }
+    assert {target for _, target in plan.moves} == {slots[name] for name in (FROM + TIME, *ACCEPT)}
 
 
 def test_gaps_of_neighbours_reach_lane_before():

@@ -10,7 +10,7 @@ from kincheck import cases
 from kincheck.core import solve
 from kincheck.core.errors import SolveError
 from kincheck.core.joints import Gear, Revolute, Screw
-from kincheck.core.kinematics import Method, NativeSolver, Style, with_forces
+from kincheck.core.kinematics import Method, NativeSolver, styles, with_forces
 from kincheck.core.kinematics.compiled import traced_forces
 from kincheck.core.kinematics.compiled.solution import ForceTable
 from kincheck.core.kinematics.forces.wanted import wanted_forces
@@ -151,7 +151,7 @@ def assert_traced(mechanism, path, allowed=1e-13, *, style="native", compiled=Fa
     of the largest force.
     """
     names = tuple(body.name for body in mechanism.moving)
-    solver = NativeSolver(style=Style(style), compiled=compiled, method=Method.ONE_PROGRAM)
+    solver = NativeSolver(style=style, compiled=compiled, method=Method.ONE_PROGRAM)
     members = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
     traced = solver.prepare(mechanism, path, forces=[each.name for each in members])(1e-12)
     assert by_program(traced)
@@ -192,7 +192,7 @@ def test_traced_forces_equal_svd_forces(name, compiled):
     assert_traced(loaded(case.mechanism), few(case), compiled=compiled)
 
 
-@pytest.mark.parametrize("style", ["paper", "conventional", "mixed", "relative"])
+@pytest.mark.parametrize("style", styles()[1:])
 @pytest.mark.parametrize("name", ["mcpherson_strut", "four_bar"])
 def test_traced_forces_in_row_styles(style, name):
     case = cases.load(name)
@@ -224,7 +224,7 @@ def train():
     )
 
 
-@pytest.mark.parametrize("style", ["native", "mixed", "relative"])
+@pytest.mark.parametrize("style", sorted({*styles()} - {"paper", "conventional"}))
 def test_traced_forces_of_every_element(style):
     """Angles of torsional springs are followed through more than a turn."""
     path = Path({"screw": Sine(9.0, 0.3)}, np.linspace(-0.6, 0.9, 9))

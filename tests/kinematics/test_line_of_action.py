@@ -10,8 +10,9 @@ from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.joints import Cylindrical, Planar, Revolute, Screw, Translational
 from kincheck.core.joints.base import AxialJoint, triad
-from kincheck.core.kinematics import NativeSolver, Style, with_forces
+from kincheck.core.kinematics import NativeSolver, styles, with_forces
 
+from ..support.by_night import sparse_by_day
 from ..support.driven_chains import COUPLINGS, SLOW, Link, chain, deviation, pushed_slide
 
 # Of the largest force or moment: some hundred operations, over a smallest singular value of 0.1,
@@ -30,7 +31,7 @@ HINGE = Link(Revolute)
 
 def native(made, style="native"):
     mechanism, names = made.mechanism, [body.name for body in made.mechanism.moving]
-    solver = NativeSolver(style=Style(style), compiled=False)
+    solver = NativeSolver(style=style, compiled=False)
     motion = solver.prepare(mechanism, made.path, bodies=names)(1e-12)
     assert motion.solved.all(), motion.message
     return with_forces(mechanism, made.path, motion).forces
@@ -59,7 +60,7 @@ def test_forces_of_driven_joint_between_bodies(kind, flipped, slow):
 
 @pytest.mark.parametrize("other_end", [False, True], ids=["", "driven from its other end"])
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-@pytest.mark.parametrize("name", COUPLINGS)
+@pytest.mark.parametrize("name", sparse_by_day(COUPLINGS, 3))
 def test_forces_of_coupled_joints(name, flipped, other_end):
     one, other, coupling = COUPLINGS[name]
     links = [HINGE, replace(one, flipped=flipped), replace(other, flipped=not flipped)]
@@ -75,7 +76,7 @@ def test_forces_of_pushed_point(kind, flipped):
     assert deviation(made, native(made)) < ROUND_OFF
 
 
-@pytest.mark.parametrize("style", Style)
+@pytest.mark.parametrize("style", styles())
 @pytest.mark.parametrize("kind", ["translational", "screw, by its slide"])
 def test_line_of_action_in_row_styles(kind, style):
     made = chain([HINGE, replace(KINDS[kind], flipped=True), HINGE])

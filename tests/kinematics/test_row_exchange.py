@@ -18,14 +18,14 @@ from kincheck.core.kinematics.continuation import segments, singular_samples
 from kincheck.core.kinematics.continuation.segments import Followed, choose_rows, with_better_rows
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import SideWalk, follow_samples
-from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.kinematics.formulation.styles import styles
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 
 from ..support.mechanisms import BRANCH, ORIGIN, Z, chain, chain_end, errors, solve_all
 from .test_redundancy import LEFT, locomotive, rim
 
-STYLES = [style.value for style in Style]
+STYLES = styles()
 ALONG = np.pi / 2.0
 """Turn of the Bennett loop at which the rows chosen at the design depend on each other; the other
 is at three times as much.
@@ -143,10 +143,8 @@ def test_conditioning_at_dependent_rows():
 @pytest.mark.parametrize(
     ("style", "off"),
     [
-        *((style, off) for style in ("native", "relative") for off in (0.003, 0.0044, 0.008)),
-        ("paper", 0.003),
-        ("conventional", 0.0044),
-        ("mixed", 0.008),
+        *((style, off) for style in (STYLES[0], STYLES[-1]) for off in (0.003, 0.0044, 0.008)),
+        *zip(STYLES[1:-1], (0.008, 0.003, 0.0044), strict=False),
     ],
 )
 def test_spherical_kite_beside_corner(off, style):

@@ -30,7 +30,7 @@ from kincheck.core.extensions.sweep.sweep import sweep_designs
 from kincheck.core.extensions.sweep.variation_file import read_variation
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import start_of
-from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.kinematics.formulation.styles import styles
 from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
 
@@ -130,7 +130,7 @@ def by_engine(engine):
 
 ENGINES = {"mujoco": MuJoCo, "pinocchio": Pinocchio, "exudyn": Exudyn}
 WAYS = [
-    *(pytest.param(by_style(style.value), id=style.value) for style in Style),
+    *(pytest.param(by_style(style), id=style) for style in styles()),
     pytest.param(by_sparse, id="sparse"),
     *(
         pytest.param(

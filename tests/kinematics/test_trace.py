@@ -14,6 +14,7 @@ from kincheck.core import JointAngle, SolveError
 from kincheck.core.cli.main import main
 from kincheck.core.kinematics.continuation.trace import trace
 
+from ..support.by_night import sparse_by_day
 from ..support.mechanisms import (
     A0,
     B0,
@@ -281,13 +282,15 @@ def test_rocker_curve_finds_dead_centres(past, direction):
     assert found == pytest.approx(expected, abs=1e-11)
 
 
-@pytest.mark.parametrize(("past", "direction"), [(-0.03, 1), (-0.004, -1), (0.004, 1), (0.03, -1)])
-def test_branch_point_beside_closed_start(past, direction):
+@pytest.mark.parametrize("past", sparse_by_day([-0.004, 0.03, 0.004, -0.03], 3))
+def test_branch_point_beside_closed_start(past):
     """All cranks in line, a little before or behind: once each way round, and the other one half a
     turn away.
     """
-    mechanism = chain(1, np.pi / 2.0 + past)
-    curve = trace(mechanism, "turn", length=25.0, direction=direction, longest=COARSE)
+    direction = -1 if past in (-0.004, 0.03) else 1
+    curve = trace(
+        chain(1, np.pi / 2.0 + past), "turn", length=25.0, direction=direction, longest=COARSE
+    )
     assert curve.closed
     turned = sorted(event.value % np.pi for event in curve.events)
     assert turned == pytest.approx([past % np.pi] * 2, abs=1e-8)
@@ -296,7 +299,7 @@ def test_branch_point_beside_closed_start(past, direction):
     assert {event.kind for event in curve.events} == {"branch point"}
 
 
-@pytest.mark.parametrize("past", [-0.004, -0.001, 0.001, 0.004])
+@pytest.mark.parametrize("past", sparse_by_day([-0.001, -0.004, 0.001, 0.004], 3))
 def test_branch_point_beside_open_start(past):
     """Seen by one of both directions."""
     curves = [

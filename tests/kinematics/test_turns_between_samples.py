@@ -21,7 +21,7 @@ from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.extensions.laboratory.bench.size import ring
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
-from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.kinematics.formulation.styles import styles
 
 from ..support.mechanisms import ORIGIN, X, Y, Z, indexing, solve_all
 
@@ -54,13 +54,11 @@ def test_engines_count_turns_between_samples():
         assert record.outcome is Outcome.PASS, record
 
 
-@pytest.mark.parametrize("style", Style)
+@pytest.mark.parametrize("style", styles())
 @pytest.mark.parametrize("turns", [1, 2, 3, -1, -4])
 def test_styles_count_turns_between_samples(turns, style):
     motions = {"turn": indexed(turns)}
-    found = solve_all(
-        indexing(), "clock", [0.0, 0.01], rate=0.01, motions=motions, style=style.value
-    )
+    found = solve_all(indexing(), "clock", [0.0, 0.01], rate=0.01, motions=motions, style=style)
     angle = 0.5 * np.pi * turns * np.array([0.0, 1.0])
     expected = np.stack([1.0 + 0.2 * np.cos(angle), 0.2 * np.sin(angle), 0.0 * angle], axis=1)
     assert np.abs(found.points["rim"].position - expected).max() < 1e-12

@@ -14,7 +14,7 @@ from kincheck.core.extensions.laboratory.paper.operations import (
     conditions,
     skew,
 )
-from kincheck.core.primitives.dot12 import PaperDot12
+from kincheck.core.extensions.laboratory.paper.rows import PaperDot12
 
 from ..oracles import naive
 from ..support.specimens import (

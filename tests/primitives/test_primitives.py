@@ -19,6 +19,7 @@ from ..support.specimens import (
     body,
     direction,
     discovered,
+    in_body_axes,
     lanes,
     make,
     retyped,
@@ -89,7 +90,7 @@ def test_primitive_steady_rows(kind, rng):
     i, j = admissible(specimen, rng)
     steady = True
     for row in specimen.primitive.rows(i.pose, j.pose):
-        shift, turn = lanes(row.ri), lanes(i.pose.turn(row.pi) if kind.body_axes else row.pi)
+        shift, turn = lanes(row.ri), lanes(i.pose.turn(row.pi) if in_body_axes(kind) else row.pi)
         along = shift if np.abs(shift).max() > 0.0 else turn
         # round-off of turning there and back
         steady = steady and float(np.ptp(along, axis=1).max()) <= 1e-14

@@ -11,7 +11,7 @@ import pytest
 from kincheck.core import solve, solve_designs
 from kincheck.core.algebra import arc_tangent, root
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics import Style
+from kincheck.core.kinematics import styles
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
@@ -117,7 +117,7 @@ def test_sine_and_cosine_of_large_angles(traced, true):
         assert np.abs(executor.get([1])[0] - true(x)).max() <= 4e-16
 
 
-@pytest.mark.parametrize("style", Style)
+@pytest.mark.parametrize("style", styles())
 def test_machine_code_models_equal_numpy(style):
     for mechanism, values in (
         (mcpherson(), np.linspace(-0.08, 0.08, 33)),

@@ -186,7 +186,6 @@ OF_KC = [
     (r".*\.(axis|at|rigid|wheel_load)", "terminal", "curves"),
     ("case", "csv", "the name of the file"),
     (r"loads\..*\.unit", "csv", "as over travel"),
-    (r".*\.not_computed\..*", "terminal page csv", "in one note, made beside it"),
 ]
 
 

@@ -20,6 +20,7 @@ from kincheck.core.studies.checks import engine_cases as force_cases
 from kincheck.core.studies.checks.check_engine import rates
 from kincheck.core.studies.checks.findings import Verdict
 
+from ..support.by_night import sparse_by_day
 from ..support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped
 from ..support.fakes import Fake, crank, swept
 from ..support.faulty_engine import Odd, Shy, Sound
@@ -197,13 +198,13 @@ def two(in_process, monkeypatch):
     reduce(monkeypatch, Screw, Universal, force_type=Universal)
 
 
-@pytest.mark.parametrize("fault", OF_MOTION)
+@pytest.mark.parametrize("fault", sparse_by_day(OF_MOTION, 3))
 def test_check_engine_finds_fault_of_motion(fault, two, monkeypatch):
     monkeypatch.setattr(checking, "force_cases", list)
     assert failures(Wrapped(fault))
 
 
-@pytest.mark.parametrize("fault", OF_FORCES)
+@pytest.mark.parametrize("fault", sparse_by_day(OF_FORCES, 3))
 def test_check_engine_finds_fault_of_forces(fault, two, monkeypatch):
     monkeypatch.setattr(checking, "probes", list)
     monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {})
@@ -212,6 +213,6 @@ def test_check_engine_finds_fault_of_forces(fault, two, monkeypatch):
     assert not any(check.startswith(("rates: ", "refusal: ")) for check in found)
 
 
-@pytest.mark.parametrize("change", ["", "no fault, with bodies", *HARMLESS])
+@pytest.mark.parametrize("change", ["no fault, with bodies", *sparse_by_day(["", *HARMLESS], 3)])
 def test_check_engine_passes_harmless_changes(change, two):
     assert failures(Wrapped(change)) == set()

@@ -1,7 +1,9 @@
 """A command line with made-up cases and engines, for runs that are killed, in processes of their
-own.
+own. SIZE=500x7 in the environment makes 500 cases, 7 engines and a case in which the first engine
+hangs.
 """
 
+import os
 import sys
 import time
 from dataclasses import dataclass
@@ -29,6 +31,15 @@ class Slow(Fake):
 # the crash comes last: a worker after it would be one more to start
 CASES = {name: crank(name, reference=name != "free") for name in ("first", "free", "segfault")}
 ENGINES = {"native": Slow("native"), "bad": Bad()}
+
+
+if size := os.environ.get("SIZE"):
+    cases, engines = map(int, size.split("x"))
+    names = [*(f"c{k}" for k in range(cases)), "deaf"]
+    CASES = {name: crank(name) for name in names}
+    names = ["native", *(f"slow{k}" for k in range(2, engines))]
+    slow = [Slow(name, seconds=6.0 / (cases * engines)) for name in names]
+    ENGINES = {each.name: each for each in (Bad(), *slow)}
 
 
 def main():

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from kincheck.core.kinematics import Method, NativeSolver, Style, with_forces
+from kincheck.core.kinematics import Method, NativeSolver, with_forces
 from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 
 from ..oracles import newton_euler
@@ -37,7 +37,7 @@ def loaded(mechanism, seed=1, gravity=GRAVITY):
 
 def solved(mechanism, case, style="native"):
     path, names = case.sweep.path, tuple(body.name for body in mechanism.moving)
-    motion = NativeSolver(style=Style(style)).prepare(mechanism, path, bodies=names)(1e-12)
+    motion = NativeSolver(style=style).prepare(mechanism, path, bodies=names)(1e-12)
     assert motion.solved.all(), motion.message
     return with_forces(mechanism, path, motion, bodies=names)
 
@@ -46,7 +46,7 @@ def traced(mechanism, case, style="native", compiled=False):
     """As `solved`, by the mechanism's own program, traced anew."""
     names = tuple(body.name for body in mechanism.moving)
     members = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
-    solver = NativeSolver(style=Style(style), compiled=compiled, method=Method.ONE_PROGRAM)
+    solver = NativeSolver(style=style, compiled=compiled, method=Method.ONE_PROGRAM)
     found = solver.prepare(
         mechanism, case.sweep.path, bodies=names, forces=[each.name for each in members]
     )(1e-12)

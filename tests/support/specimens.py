@@ -10,6 +10,7 @@ from dataclasses import MISSING, dataclass, fields, replace
 import numpy as np
 from kincheck.core import primitives as p
 from kincheck.core.algebra import IDENTITY, ZERO, Quat, Vec3, cross
+from kincheck.core.doors import extensions
 from kincheck.core.jet import Jet
 from kincheck.core.primitives.base import Drive, Pose, Primitive, Twist
 
@@ -21,12 +22,20 @@ def cos_sin(a):
 
 
 LANES = 1000
+PAPER_ROWS = "kincheck.core.extensions.laboratory.paper.rows"
+
+
+def in_body_axes(kind):
+    """Whether the rows of a primitive type are in body axes: those of the paper's styles."""
+    return kind.__module__.startswith(PAPER_ROWS.rpartition(".")[0])
 
 
 def discovered():
     """All primitive types of the package, whether or not anything exports them."""
     for module in pkgutil.iter_modules(p.__path__):
         importlib.import_module(f"{p.__name__}.{module.name}")
+    if "laboratory" in extensions():
+        importlib.import_module(PAPER_ROWS)
     waiting, found = [Primitive], []
     while waiting:
         subtypes = [
@@ -94,7 +103,7 @@ class Body:
 
     def in_axes_of(self, primitive):
         """Angular velocity and acceleration as the primitive's rows take them."""
-        if not primitive.body_axes:
+        if not in_body_axes(type(primitive)):
             return self
         to_body = self.pose.A.T
         return replace(self, w=to_body @ self.w, w_t=to_body @ self.w_t)

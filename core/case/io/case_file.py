@@ -5,22 +5,18 @@ to TOML, in SI units, with all digits of every number.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from ...errors import CaseError, MechanismError, SolveError, unknown
-from ..case import Case, Truth, size
+from ...errors import CaseError, MechanismError, unknown
+from ..case import Case, Truth
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
-from .document import LONGEST_TEXT, Section, explained, fault, read_tables, shown
+from .document import LONGEST_TEXT, Section, explained, read_tables, shown
 from .mechanism_sections import (
-    free_lines,
     mechanism_lines,
-    read_free,
     read_mechanism,
-    read_resting,
-    read_rig,
     read_sweep,
     sweep_lines,
     values_in_file,
@@ -29,7 +25,7 @@ from .outputs import output_lines, read_output, with_all_coordinates
 from .readers import LARGEST_FILE
 from .reference import read_reference, reason_against, reference_lines
 from .schema import SCHEMA, ClosureKeys, ReferenceKeys, UnitsKeys
-from .sections import case_keys, sections
+from .sections import case_keys, sections, undriven
 from .toml_text import toml_table
 
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
@@ -51,7 +47,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     """
     file = Path(path)
     advice = "a case holds hardpoints; samples belong into a reference file"
-    root = Section(file, "", _with_free(read_tables(file, LARGEST_FILE, advice, SCHEMA)))
+    root = Section(file, "", _with_defaults(read_tables(file, LARGEST_FILE, advice, SCHEMA)))
     keys = root.typed(case_keys())
     for what in _PARTS:
         if (count := len(getattr(keys, what))) > MOST_PARTS:
@@ -62,36 +58,21 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     written = Section(file, "units", keys.units).typed(UnitsKeys)
     units = FileUnits(LENGTHS[written.length], ANGLES[written.angle])
     root = replace(root, units=units)
+    for each in sections():
+        if (table := root.at(each.key)).value is not None:
+            table.typed(each.keys)
     mechanism = read_mechanism(root, keys)
     columns = None
     if keys.reference is not None:
         columns = root.at("reference").typed(ReferenceKeys)
-    free = read_free(root, mechanism)
     sweep, driver, own_grid = read_sweep(root, mechanism, columns)
     case = Case(
         *(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()),
         length_unit=units.length.name,
         angle_unit=units.angle.name,
-        free=free,
         formerly=tuple(keys.formerly),
     )
-    resting = None
-    if keys.equilibrium is not None:
-        from .resting import at_rest  # it takes the solver, and few cases need it
-
-        resting = read_resting(root.at("equilibrium"), mechanism)
-        with explained(file, "equilibrium", units.length):
-            try:
-                case = at_rest(case, resting)
-            except SolveError as error:
-                raise fault(file, "equilibrium", str(error)) from None
     case = _with_outputs(root, case)
-    if resting is not None:
-        from .resting import with_efforts
-
-        case = with_efforts(case, resting)
-    if keys.compliance is not None:
-        case = replace(case, rig=read_rig(root.at("compliance"), case.mechanism))
     with explained(file, "closure", units.length):
         closing = Section(file, "closure", keys.closure).typed(ClosureKeys)
         case = _within_digits(case, closing, closure)
@@ -110,18 +91,12 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     return read_reference(file, columns, driver, units, case, convention, own_grid=own_grid)
 
 
-def _with_free(tables: dict[str, Any]) -> dict[str, Any]:
-    """Return the tables of a file; beside [free] and [equilibrium], those of a driven motion may be
-    left out.
-    """
-    free = tables.get("free")
-    if "equilibrium" in tables:
-        return {"drivers": {}, **tables}
-    if not isinstance(free, dict):
-        return tables
-    free = cast("dict[str, Any]", free)
-    sweep = {"start": 0.0, "stop": free.get("duration"), "steps": free.get("samples")}
-    return {"drivers": {}, "sweep": sweep, **tables}
+def _with_defaults(tables: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a file with those of a driven motion that others let it leave out."""
+    for each in sections():
+        if isinstance(table := tables.get(each.key), dict):
+            tables = {**each.defaults(cast("dict[str, Any]", table)), **tables}
+    return tables
 
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
@@ -156,8 +131,8 @@ def _with_outputs(root: Section, case: Case) -> Case:
     outputs = outputs or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(case.mechanism, outputs), outputs=outputs)
     for each in sections():
-        outputs = tuple(each.with_derived(outputs, tables.get(each.key), size(case)))
-    return replace(case, outputs=outputs)
+        case = each.with_derived(case, tables.get(each.key))
+    return case
 
 
 def case_text(case: Case, comments: Sequence[str] = ()) -> str:
@@ -173,7 +148,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         CaseError: no case file can express the case: nothing drives it, samples on no even grid,
             outputs of several axles, or names and texts beyond their limits.
     """
-    if not case.mechanism.drivers and case.free is None:
+    if not case.mechanism.drivers and not undriven(case.tables):
         raise CaseError(f"case {case.name!r}: nothing drives it; drive a joint or a point")
     values = values_in_file(case)
     reference = reference_lines(case, values)
@@ -191,12 +166,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         lines += toml_table({"gravity": case.mechanism.gravity})
     lines += mechanism_lines(case)
     lines += sweep_lines(case, values, own_grid=bool(reference))
-    lines += free_lines(case)
     lines += _closure_lines(case)
-    if case.rig is not None:
-        given = {f.name: getattr(case.rig, f.name) for f in fields(case.rig)}
-        given = {key: value for key, value in given.items() if value is not None}
-        lines += toml_table(given, "compliance")
     for each in sections():
         lines += each.lines(case)
     lines += output_lines(case)

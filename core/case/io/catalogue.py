@@ -19,13 +19,12 @@ from ...mechanism.motions import Motion
 from ..joint_probe import specimen
 from ..measures import Measure, key_of
 from ..quantity import TypedQuantity, own_keys
-from .mechanism_sections import DRIVERS, RestingKeys, RigKeys
+from .mechanism_sections import DRIVERS
 from .schema import (
     COORDINATE,
     SCHEMA,
     BodyKeys,
     ClosureKeys,
-    FreeKeys,
     OutputKeys,
     PointKeys,
     ReferenceKeys,
@@ -192,11 +191,8 @@ def case_schema() -> dict[str, Any]:
         "units": UnitsKeys,
         "closure": ClosureKeys,
         "sweep": SweepKeys,
-        "free": FreeKeys,
         **{each.key: each.keys for each in sections()},
         "reference": ReferenceKeys,
-        "compliance": RigKeys,
-        "equilibrium": RestingKeys,
     }
     motions = _structs(Motion.registry)
     found = document_schema(SCHEMA, case_keys(), tables, single, {"motion": motions})

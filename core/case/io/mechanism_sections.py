@@ -1,5 +1,5 @@
 """The mechanism and its motion in a case file: [bodies], [joints], [couplers], [points], [drivers],
-[forces] and [sweep], read in SI units and written; and [equilibrium] and [compliance].
+[forces] and [sweep], read in SI units and written.
 """
 
 from __future__ import annotations
@@ -7,17 +7,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import msgspec
 import numpy as np
-from msgspec import Meta
 
 from ...errors import CaseError, with_article
 from ...joints import Coupler, Follower, Joint, LinearCoupler
-from ...mechanism.body import ACCELERATION, INERTIA, STIFFNESS, checked_inertia
+from ...mechanism.body import ACCELERATION, INERTIA, checked_inertia
 from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper, TorsionSpringDamper
-from ...mechanism.mechanism import Body, Mechanism, Point, coordinates
+from ...mechanism.mechanism import Body, Mechanism, Point
 from ...mechanism.motions import (
     ROUNDED_TIME,
     Absolute,
@@ -30,7 +28,7 @@ from ...mechanism.motions import (
     Table,
 )
 from ...trajectory import Array
-from ..case import MARKER, SLOW, TIME, Case, Free, Load, Resting, Rig, Sweep
+from ..case import MARKER, SLOW, TIME, Case, Sweep
 from ..units import RADIAN, SECOND, FileUnits, Unit, plain
 from .document import Section, explained, parse, read_text, shown
 from .reference import read_grid
@@ -38,15 +36,14 @@ from .schema import (
     MOST_SAMPLES,
     BodyKeys,
     CaseKeys,
-    FreeKeys,
     PointKeys,
     ReferenceKeys,
     SweepKeys,
-    Text,
     bushing_keys,
     keys_of,
     own_fields,
 )
+from .sections import undriven
 from .toml_text import toml_table
 
 DRIVERS: Mapping[str, type[Driver]] = {
@@ -77,8 +74,7 @@ def read_mechanism(root: Section, keys: CaseKeys) -> Mechanism:
         point = section.typed(PointKeys)
         points.append(Point(name, point.body, units.place(point.position)))
     joints, couplers = _joints(root)
-    free = any(root.at(table).value is not None for table in ("free", "equilibrium"))
-    drivers = _drivers(root.at("drivers"), free=free)
+    drivers = _drivers(root.at("drivers"), free=undriven(root.table))
     forces = [
         _build(section, section.class_of("force", ELEMENTS), name)
         for name, section in root.at("forces").each()
@@ -232,9 +228,7 @@ def read_sweep(
     """
     section = root.at("sweep")
     if section.value is None:
-        if root.at("equilibrium").value is None:
-            raise section.fault("missing, expected a table; add the key 'sweep'")
-        return Sweep(TIME, np.ones(1), 0.0), SECOND, False
+        raise section.fault("missing, expected a table; add the key 'sweep'")
     sweep = section.typed(SweepKeys)
     drivers = dict(root.at("drivers").each())
     moved = {
@@ -242,7 +236,7 @@ def read_sweep(
         for name, each in drivers.items()
         if (motion := each.at("motion")).value is not None
     }
-    _require_moved(section, sweep, drivers, moved, free=root.at("free").value is not None)
+    _require_moved(section, sweep, drivers, moved, free=undriven(root.table))
     motions = {name: _motion(mechanism, name, each) for name, each in moved.items()}
     convert, design = SECOND, 0.0
     if sweep.driver != TIME:
@@ -360,29 +354,6 @@ def _require_defined(section: Section, motion: Motion, times: Array) -> None:
 def _unit(driver: Driver, units: FileUnits) -> Unit:
     """Return the unit of a driver's values in the file."""
     return units.angle if driver.turns else units.length
-
-
-def read_free(root: Section, mechanism: Mechanism) -> Free | None:
-    """Read the free motion; None without one."""
-    section = root.at("free")
-    if section.value is None:
-        return None
-    keys, rates = section.typed(FreeKeys), dict[str, float]()
-    known = coordinates(mechanism)
-    for name, rate in keys.rates.items():
-        expected = "a driver or a joint with a rotation or translation"
-        section.at("rates").require(name, known, expected)
-        rates[name] = _unit(known[name], root.units)(rate)
-    return Free(keys.duration, keys.samples, rates)
-
-
-def free_lines(case: Case) -> list[str]:
-    """Return the lines of [free]."""
-    if case.free is None:
-        return []
-    rates = toml_table(case.free.rates, "free", "rates") if case.free.rates else []
-    grid = {"duration": case.free.duration, "samples": case.free.samples}
-    return [*toml_table(grid, "free"), *rates]
 
 
 def mechanism_lines(case: Case) -> Iterator[str]:
@@ -523,59 +494,3 @@ def with_bushings(case: Case, file: Path, *tables: str) -> Case:
     bushings = (*case.mechanism.bushings, *found)
     with root.at("joints").explained():
         return replace(case, mechanism=replace(case.mechanism, bushings=bushings))
-
-
-Names = Annotated[tuple[str, ...] | None, Meta(description="a list of names")]
-Loads = Annotated[tuple[Load, ...], Meta(description=f"a list of {', '.join(Load)}")]
-Stiffness = Annotated[
-    Annotated[float, Meta(gt=0.0)] | None, Meta(description="a number greater than zero")
-]
-
-
-class RigKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """[compliance]."""
-
-    wheel: Text | None = None
-    contact: Text | None = None
-    held: Names = None
-    loads: Loads = tuple(Load)
-    tire_stiffness: Stiffness = None
-
-
-class RestingKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """[equilibrium]."""
-
-    held: Annotated[tuple[str, ...], Meta(description="a list of names")] = ()
-
-
-def read_resting(section: Section, mechanism: Mechanism) -> Resting:
-    """Return the table [equilibrium].
-
-    Raises:
-        CaseError: unknown keys or names.
-    """
-    keys, known = section.typed(RestingKeys), [driver.name for driver in mechanism.drivers]
-    for name in keys.held:
-        section.at("held").require(name, known, "a driver")
-    return Resting(keys.held)
-
-
-def read_rig(section: Section, mechanism: Mechanism) -> Rig:
-    """Return the rig of a file, in SI.
-
-    Raises:
-        CaseError: unknown keys or names.
-    """
-    keys = section.typed(RigKeys)
-    known: dict[str, list[str]] = {
-        "wheel": [body.name for body in mechanism.moving],
-        "contact": [point.name for point in mechanism.points],
-        "held": [driver.name for driver in mechanism.drivers],
-    }
-    what = {"wheel": "a body that moves", "contact": "a point", "held": "a driver"}
-    for key, names in known.items():
-        given: Any = getattr(keys, key)
-        for name in [given] if isinstance(given, str) else given or ():
-            section.at(key).require(name, names, what[key])
-    stiffness = keys.tire_stiffness and section.units.power(STIFFNESS, keys.tire_stiffness)
-    return Rig(keys.wheel, keys.contact, keys.held, keys.loads, stiffness)

@@ -101,6 +101,7 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
             (options.citation or "").strip(),
             file.name,
             sha256(file),
+            by_option=True,
             signs=convention + " (assumed: the file names none)" * assumed,
         ),
     )

@@ -267,9 +267,6 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     reference: Table | None = None
     gravity: Numbers3 = (0.0, 0.0, 0.0)
     forces: Table = {}
-    compliance: Table | None = None
-    equilibrium: Table | None = None
-    free: Table | None = None
 
 
 class BodyKeys(msgspec.Struct, forbid_unknown_fields=True):
@@ -307,19 +304,6 @@ class SweepKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
         | None
     ) = None
     rate: Number | None = None
-
-
-class FreeKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """[free]; rates in the units of the drivers, per second."""
-
-    duration: Annotated[float, Meta(gt=0.0, description="a number of seconds greater than zero")]
-    samples: Annotated[
-        int,
-        Meta(ge=2, le=MOST_SAMPLES, description=f"a whole number of samples, 2 to {MOST_SAMPLES}"),
-    ]
-    rates: Annotated[
-        dict[str, float], Meta(description="a table of numbers by driver or joint")
-    ] = {}
 
 
 class ClosureKeys(msgspec.Struct, forbid_unknown_fields=True):

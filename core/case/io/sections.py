@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -27,13 +27,19 @@ class CaseSection:
         keys: of its content.
         types: classes of outputs by type.
         heading, remark: of the types in `kincheck list --outputs`.
+        moves: whether it changes the motion, and is read before others.
     """
 
     key: ClassVar[str]
     keys: ClassVar[type[msgspec.Struct]]
     heading: ClassVar[str] = ""
     remark: ClassVar[str] = ""
+    moves: ClassVar[bool] = False
     types: ClassVar[Mapping[str, type[TypedQuantity]]] = {}
+
+    def defaults(self, table: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return tables that may be left out beside this one; none if drivers are to move."""
+        return {}
 
     def read(self, section: Section, case: Case) -> tuple[Case, Any]:
         """Return the case with what the table says, and the table for its outputs.
@@ -56,15 +62,9 @@ class CaseSection:
         """
         raise NotImplementedError
 
-    def with_derived(
-        self, outputs: Sequence[Quantity], table: Any, size: float
-    ) -> Sequence[Quantity]:
-        """Return outputs with those derived from them.
-
-        Args:
-            size: of the mechanism [m].
-        """
-        return outputs
+    def with_derived(self, case: Case, table: Any) -> Case:
+        """Return a case with the outputs that follow from its others."""
+        return case
 
     def convention(self, section: Section) -> str:
         """Return the convention of signs that a table names; empty without one."""
@@ -105,7 +105,13 @@ class CaseSection:
 @cache
 def sections() -> Sequence[CaseSection]:
     """Return the tables that extensions read."""
-    return [each.load() for each in offers("sections").values()]
+    found: list[CaseSection] = [each.load() for each in offers("sections").values()]
+    return sorted(found, key=lambda each: not each.moves)
+
+
+def undriven(keys: Collection[str]) -> bool:
+    """Return whether tables of these keys allow a motion without drivers."""
+    return any(each.key in keys and each.defaults({}) for each in sections())
 
 
 @cache

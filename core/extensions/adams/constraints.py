@@ -158,11 +158,12 @@ def assemble_links(model: Model, links: Sequence[Link], size: float, tolerance: 
     found = _close_links(model, links, size, max(WEAK, ADDED_UP * tolerance / size))
     for link in links:
         shift, turn = _gap(link, found)
-        if max(shift, size * turn) > max(ADDED_UP * tolerance, CLOSED * ADDED_UP * size):
+        if max(shift, size * turn) > max(tolerance, CLOSED * ADDED_UP * size):
             raise link.statement.fault(
                 f"its markers {link.i} and {link.j} cannot be brought together: they are"
                 f" {_text(*gaps[link.statement.name])} apart as the dataset places them, and"
-                f" {_text(shift, turn)} in the nearest assembly; correct a marker or a part"
+                f" {_text(shift, turn)} in the nearest assembly, expected {tolerance:.2g} m at"
+                " most; correct a marker or a part, or give --closure"
             )
     told = sorted(opened.items(), key=lambda each: -max(each[1][0], size * each[1][1]))
     moves = shortened([f"{name} by {_text(*gap)}" for name, gap in told], MOST_TOLD)

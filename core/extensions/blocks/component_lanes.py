@@ -19,7 +19,6 @@ from ...failures import FailureKind, PoseFailure
 from ...kinematics.compiled.compiled_model import CLOSED, Model, compile_model
 from ...kinematics.compiled.request import (
     ACCEPT,
-    EARLIER,
     FROM,
     LARGEST_SIGMA,
     RATE,
@@ -68,7 +67,7 @@ class ComponentType:
         """Return the columns of `fixed` with the tolerances, and with times and singular values at
         the poses before.
         """
-        names = (*ACCEPT, EARLIER + TIME, *(FROM + name for name in (TIME, SIGMA, LARGEST_SIGMA)))
+        names = (*ACCEPT, *(FROM + name for name in (TIME, SIGMA, LARGEST_SIGMA)))
         return {name: list(self.model.plan.fixed).index(self.model.slots[name]) for name in names}
 
     def rows(self, name: str, member: int) -> range:
@@ -267,7 +266,7 @@ class ComponentLanes(Lanes):
     def set_prediction_start(self, time: float, path: Path) -> PoseFailure | None:
         """See `Lanes`. The rates of the path where the mechanism stands are those of a sample."""
         for kind, fixed in zip(self.kinds, self._fixed, strict=True):
-            fixed[:, [kind.column[FROM + TIME], kind.column[EARLIER + TIME]]] = time
+            fixed[:, kind.column[FROM + TIME]] = time
         self.attempt(np.array([time]), path)
         self.carry(0)
         return None

@@ -21,7 +21,6 @@ from ...kinematics.compiled.dense_equations import System
 from ...kinematics.compiled.programs import Tracer
 from ...kinematics.compiled.request import ACCEPT, MAX_ITERATIONS, Request
 from ...kinematics.compiled.solution import Columns
-from ...kinematics.compiled.step_programs import ABOUT
 from ...kinematics.continuation.segments import BETTER, SEEN
 from ...kinematics.continuation.singular_poses import SOUND, Anchor, Numbers
 from ...kinematics.continuation.walk import failure_kind
@@ -38,7 +37,6 @@ from ...kinematics.formulation.acceptance_criteria import (
     slope_between,
 )
 from ...kinematics.formulation.constraints import measured
-from ...kinematics.formulation.relative import row_names
 from ...kinematics.formulation.state_vectors import turns
 from ...kinematics.structure.degrees_of_freedom import (
     NullSpaces,
@@ -99,8 +97,7 @@ class Poses:
 
     Attributes:
         sample: inputs of the equations, the time first.
-        earlier: time of the pose before; the same without one.
-        state, taylor: the pose, and the Taylor step to it.
+        state: the pose.
         rates, accelerations: of the unknowns.
         sigmas, slopes: of the blocks, and their change by the pose, zero if unknown.
         largest, high: largest sigmas so far, and since other rows were looked for.
@@ -108,9 +105,7 @@ class Poses:
     """
 
     sample: Array
-    earlier: Array
     state: Array
-    taylor: Array
     rates: Array
     accelerations: Array
     sigmas: Array
@@ -261,8 +256,8 @@ class SparseLanes(Lanes):
                 FailureKind.NOT_CLOSED,
             )
         none = np.zeros((self.rows.blocks.count, 1))
-        poses = (found.state, found.state, zero, zero), (none, none, none, none)
-        return Poses(sample, sample[0], *poses[0], *poses[1], sample[0]).lane(0)
+        pose = Poses(sample, found.state, zero, zero, none, none, none, none, sample[0])
+        return pose.lane(0)
 
     def _independent(self, entries: Array, count: int) -> Indices | None:
         system = self.system
@@ -275,7 +270,7 @@ class SparseLanes(Lanes):
     @property
     def _redundant(self) -> list[str]:
         """The rows left out, as "joint: primitive"."""
-        names = row_names(self.system.tracer.formulation)
+        names = self.system.tracer.formulation.row_names
         return [names[row] for row in self.rows.dropped]
 
     def begin(self) -> None:
@@ -318,8 +313,6 @@ class SparseLanes(Lanes):
         self.here = replace(
             here,
             sample=sample[:, 0],
-            earlier=sample[0, 0],
-            taylor=here.state,
             rates=found.rates[:, 0],
             accelerations=found.accelerations[:, 0],
             sigmas=sigmas,
@@ -355,15 +348,13 @@ class SparseLanes(Lanes):
         self.last = count - 1
         sample = table[:, np.minimum(np.arange(POSES), count - 1)]
         with np.errstate(all="ignore"):  # lanes that diverge are found by their residuals
-            h, last = sample[0] - here.time, here.time - float(here.earlier)
+            h = sample[0] - here.time
             state, rates, accelerations = (
                 each[:, None] for each in (here.state, here.rates, here.accelerations)
             )
             whole = np.broadcast_to(state, (len(state), POSES))
             taylor = self.system.stepped(whole, h * (rates + (0.5 * h) * accelerations))
-            lack = np.where(ABOUT * abs(last) > np.abs(h), (h / (last or 1.0)) ** 3, 0.0)
-            predicted = taylor + lack * (here.state - here.taylor)[:, None]
-            solved = self._iterate(predicted, sample, self._limits.tol, MAX_ITERATIONS, count)
+            solved = self._iterate(taylor, sample, self._limits.tol, MAX_ITERATIONS, count)
             self._judge(solved, sample, taylor, count, neighbours=neighbours)
         return self.worst[MARGINS, :count].copy()
 
@@ -457,9 +448,7 @@ class SparseLanes(Lanes):
         self.worst[:] = closure, leftover, solved.iterations, sigma, margin
         self._found = Poses(
             sample,
-            np.full(POSES, here.time),
             state,
-            taylor,
             motion.rates,
             motion.accelerations,
             sigmas,

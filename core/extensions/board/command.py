@@ -71,6 +71,7 @@ class CompareSteppers(Command):
         from ...case.io.atomic_files import write_all
         from ...harness.record import to_json
         from ...report.sections import page, print_report
+        from ..free.section import free_in
         from . import run
         from .page import report
         from .results import Board, earlier_rows
@@ -86,7 +87,7 @@ class CompareSteppers(Command):
         cases = registry.find_cases(self.case, unread, driven=False)
         if not self.case:
             every = map(registry.case, registry.cases())
-            cases = [case for case in every if case.free is not None]
+            cases = [case for case in every if free_in(case)]
         refuse(unread.values())
         problems = list[str]()
         scripts, file = offers("steppers"), self.out / "board.json"

@@ -20,6 +20,7 @@ from ...doors import offers
 from ...errors import KincheckError, UnsupportedError, unknown
 from ...extras import THREADS, how_to_add, how_to_install, python_of
 from ...harness.record import to_json
+from ..free.section import free_in
 from .results import Row, Run, State
 from .truth import Truth
 
@@ -69,7 +70,7 @@ class Stepper:
         if self.accuracies:
             return [{"accuracy": each} for each in self.accuracies]
         gap = float(truth.times[-1]) / (len(truth.times) - 1)
-        asked = truth.case.free
+        asked = free_in(truth.case)
         assert asked is not None
         first = math.ceil(steps / (asked.samples - 1))
         return [{"step": gap / n, "steps": n} for n in (first << k for k in range(HALVINGS + 1))]

@@ -18,6 +18,7 @@ from ...mechanism.loads import SpringDamper
 from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array
 from ..free.free_dynamics import free_motion
+from ..free.section import free_in
 from .results import TruthFacts
 
 
@@ -87,12 +88,13 @@ def truth_of(case: Case) -> Truth:
     Raises:
         KincheckError: it has no [free], or no free motion.
     """
-    if case.free is None:
+    free = free_in(case)
+    if free is None:
         raise KincheckError(
             f"case {case.name!r} says no duration and samples of its free motion; add [free] with"
             " duration and samples"
         )
-    begin, free, mechanism = perf_counter(), case.free, case.mechanism
+    begin, mechanism = perf_counter(), case.mechanism
     found = free_motion(mechanism, np.linspace(0.0, free.duration, free.samples), free.rates)
     frames = dict[str, Frames]()
     for name, body in found.motion.bodies.items():

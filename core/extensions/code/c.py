@@ -10,6 +10,8 @@ from ...case.case import Case
 from .dialects import C, steps_text, tables, words_of
 from .solved import SolvedCase, solved_case
 
+WHOLE = ("CARRY", "STANDING")
+"""Beginnings of the tables of whole numbers."""
 HEADER = """\
 /* {case}: {source}
  * Written by kincheck. Each output has three numbers, in the order of the outputs: its value,
@@ -70,7 +72,7 @@ int {n}_move(void *state, double driver, double rate, double *outputs) {{
   int failed;
   if (!isfinite(goal) || !isfinite(r) || !(s[SIZE + PARAMETERS] > 0.0)) return 1;
   copy(w, s);
-  failed = travel(w, n, goal);
+  failed = travel(w, n, goal, HALVINGS);
   if (failed) return failed;
   copy(s, w);
   tell(s, outputs, r);
@@ -147,12 +149,11 @@ def source(solved: SolvedCase, name: str) -> str:
     """Return the source."""
     numbers = [f"#define {key} {value!r}" for key, value in solved.numbers.items()]
     known = tables(solved)
-    numbers.append(f"#define CARRIED {len(known['CARRY_TO'])}")
     if solved.parameters:
         known["NOMINAL"] = [each.nominal for each in solved.parameters]
     lines = [
         C.table.format(
-            kind="int" if table.startswith("CARRY") else "double",
+            kind="int" if table.startswith(WHOLE) else "double",
             name=table,
             numbers=", ".join(map(repr, values)),
         )
@@ -170,7 +171,7 @@ def source(solved: SolvedCase, name: str) -> str:
             *numbers,
             *lines,
             "",
-            C.text(steps_text(solved)).replace("SCRATCH", "double c[12];"),
+            C.text(steps_text(solved)),
             tail.format(
                 n=name,
                 outputs=outputs,

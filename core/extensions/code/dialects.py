@@ -13,11 +13,15 @@ from dataclasses import dataclass
 
 from ...case.quantity import STILL
 from ...kinematics.compiled.request import TIME
-from ...mechanism.motions import Absolute, Motion, Ramp, Sine
+from ...mechanism.motions import Absolute, Motion, Ramp, Sine, Table
 from ...program import Program
 from ...unit_text import with_unit
 from .solved import CodeOutput, SolvedCase
 
+PIECE = 500
+"""Operations of a function: compilers of JavaScript leave long functions slow, and those of C take
+long for them.
+"""
 OPERATIONS = {
     "+": "({0} + {1})",
     "-": "({0} - {1})",
@@ -44,13 +48,16 @@ class Dialect:
     Attributes:
         words: words of the text, and those of the language in their place.
         table: declaration of a table, of its kind, name and numbers.
+        scratch: declaration of room for numbers, of a name and their count.
     """
 
     words: dict[str, str]
     table: str
+    scratch: str
 
     def text(self, text: str) -> str:
         """Return a text of the steps in this language."""
+        text = re.sub(r"SCRATCH\((\w), (\d+)\);", self.scratch, text)
         return re.sub(r"\b[A-Za-z]\w*\b", lambda word: self.words.get(word[0], word[0]), text)
 
 
@@ -68,6 +75,7 @@ C = Dialect(
         "NOTHING": "NAN",
     },
     "static const {kind} {name}[] = {{{numbers}}};",
+    r"double \1[\2];",
 )
 JAVASCRIPT = Dialect(
     {
@@ -86,6 +94,7 @@ JAVASCRIPT = Dialect(
         **{name: f"Math.{name}" for name in ("sqrt", "sin", "cos", "atan2", "floor")},
     },
     "const {name} = [{numbers}];",
+    r"const \1 = new Float64Array(\2);",
 )
 
 STEPS = """
@@ -118,15 +127,16 @@ ACTION begin(LANE s) {
   sample(s, s[AT]);
   outputs(s);
   carry(s);
-  s[EARLIER] = s[HERE];
 }
 
-/* lane w to time t by as many steps as it takes, halved where one fails; n is for attempts */
-ANSWER travel(LANE w, LANE n, NUMBER goal) {
+BETTER_ROWS
+/* lane w to time t by as many steps as it takes, halved so many times where one fails; n is for
+   attempts */
+ANSWER travel(LANE w, LANE n, NUMBER goal, WHOLE most) {
   VALUE step = goal - w[AT];
   COUNT halvings = 0;
   for (COUNT k = 0; w[AT] != goal; k++) {
-    VALUE to = w[AT] + step;
+    TRY_BETTER_ROWSVALUE to = w[AT] + step;
     if (step > 0.0 ? to > goal : to < goal) to = goal;
     COUNT failed = attempt(n, w, to);
     if (failed == 0) {
@@ -139,7 +149,7 @@ ANSWER travel(LANE w, LANE n, NUMBER goal) {
     } else {
       step = 0.5 * step;
       halvings = halvings + 1;
-      if (halvings > 40 || k > 20000 || !(fabs(step) > 0.0)) {
+      if (halvings > most || k > 20000 || !(fabs(step) > 0.0)) {
         return w[SIGMA] < 0.1 * w[LARGEST] ? 2 : failed;
       }
     }
@@ -147,6 +157,37 @@ ANSWER travel(LANE w, LANE n, NUMBER goal) {
   return 0;
 }
 """
+BETTER_ROWS = """
+/* lane w at its pose with another choice of the independent rows, in lane n: 1 if it stands there,
+   and these are far from dependent */
+ANSWER renew(LANE n, FROM w, NUMBER choice) {
+  for (COUNT k = 0; k < SIZE; k++) n[k] = 0.0;
+  for (COUNT k = 0; k < STAYING; k++) n[STANDING[k]] = w[STANDING[k]];
+  n[CHOICE] = choice;
+  sample(n, w[AT]);
+  PREPARE
+  for (COUNT k = 0; k < ASSEMBLING; k++) {
+    newton(n);
+    if (!(n[RESIDUAL] > CLOSED)) break;
+  }
+  begin(n);
+  VALUE moved = 0.0;
+  for (COUNT k = 0; k < POSE; k++) {
+    VALUE far = fabs(n[STANDING[k]] - w[STANDING[k]]);
+    if (far > moved) moved = far;
+  }
+  if (!(n[CLOSURE] <= CLOSED && n[LEFTOVER] <= CONSISTENT && n[BRANCH] > 0.0)) return 0;
+  if (!(moved <= NEAR * n[SIGMA] && n[SIGMA] > BETTER * w[SIGMA])) return 0;
+  if (n[LARGEST] < w[LARGEST]) n[LARGEST] = w[LARGEST];
+  if (n[LARGEST_NOW] < w[LARGEST]) n[LARGEST_NOW] = w[LARGEST];
+  return 1;
+}
+
+"""
+TRY_BETTER_ROWS = """for (COUNT c = 0; c < CHOICES && w[SIGMA] < 0.1 * w[LARGEST]; c++) {
+      if (c != w[CHOICE] && renew(n, w, c)) copy(w, n);
+    }
+    """
 ASSEMBLE = """
 /* lane s at the design position of its geometry: 1 if it closes there */
 ANSWER assemble(LANE s) {
@@ -162,21 +203,76 @@ ANSWER assemble(LANE s) {
 """
 
 
+def _by_choice(name: str, programs: Sequence[Program]) -> Iterator[str]:
+    """Yield the functions of a program, by the choice of rows of the lane if there are several."""
+    if len(programs) == 1:
+        yield program_text(name, programs[0])
+        return
+    yield from (program_text(f"{name}_of_{k}", each) for k, each in enumerate(programs))
+    calls = [f"if (s[CHOICE] == {k}.0) {name}_of_{k}(s);" for k in range(len(programs))]
+    yield _function(f"ACTION {name}(LANE s)", calls)
+
+
 def program_text(name: str, program: Program) -> str:
-    """Return a program as a function of a lane."""
-    repeated = program.times > 1
+    """Return a program as a function of a lane, in pieces if it is long."""
+    if program.times > 1:
+        return _repeated(name, program)
+    nodes, worked = (
+        program.nodes,
+        [k for k, (op, *_) in enumerate(program.nodes) if op in OPERATIONS],
+    )
+    pieces = [worked[k : k + PIECE] for k in range(0, len(worked), PIECE)]
+    at = {k: number for number, piece in enumerate(pieces) for k in piece}
+    last = len(pieces) - 1
+    outputs = program.outputs.values()
+    # what a later piece reads, or the last lines where there are several
+    kept = [x for k in worked for x in map(int, nodes[k][1:]) if at.get(x, at[k]) != at[k]]
+    kept += [k for k in outputs if at.get(k, last) != last]
+    place = {k: number for number, k in enumerate(dict.fromkeys(kept))}
+    functions, before = list[str](), list[str]()
+    for number, piece in enumerate(pieces or [[]]):
+        needed = [x for k in piece for x in map(int, nodes[k][1:])]
+        needed += outputs if number == max(last, 0) else ()
+        lines = [
+            f"REAL v{k} = {f't[{place[k]}]' if k in at else _given(nodes[k])};"
+            for k in dict.fromkeys(needed)
+            if at.get(k) != number
+        ]
+        for k in piece:
+            op, *read = nodes[k]
+            lines.append(f"REAL v{k} = {OPERATIONS[op].format(*(f'v{int(x)}' for x in read))};")
+            if k in place:
+                lines.append(f"t[{place[k]}] = v{k};")
+        if number < last:
+            used = [each for each in "st" if any(f"{each}[" in line for line in lines)]
+            given = ", ".join(f"LANE {each}" for each in used)
+            functions.append(_function(f"ACTION {name}_{number}({given})", lines))
+            before.append(f"{name}_{number}({', '.join(used)});")
+            continue
+        if before:
+            before.insert(0, f"SCRATCH(t, {max(1, len(place))});")
+        writes = [f"s[{slot}] = v{k};" for slot, k in program.outputs.items()]
+        functions.append(_function(f"ACTION {name}(LANE s)", [*before, *lines, *writes]))
+    return "\n\n".join(functions)
+
+
+def _given(node: Sequence[object]) -> str:
+    """Return the text of a number that is not computed."""
+    op, value = node
+    return f"s[{value}]" if op == "input" else _constant(float(str(value)))
+
+
+def _repeated(name: str, program: Program) -> str:
+    """Return the function of a program that runs over neighbouring slots, and keeps the largest."""
     lines: list[str] = []
     for k, (op, *read) in enumerate(program.nodes):
         if op == "input":
-            value = f"s[{int(read[0])}{' + k' if repeated else ''}]"
+            value = f"s[{int(read[0])} + k]"
         elif op == "const":
             value = _constant(float(read[0]))
         else:
             value = OPERATIONS[op].format(*(f"v{int(x)}" for x in read))
         lines.append(f"REAL v{k} = {value};")
-    if not repeated:
-        lines += [f"s[{slot}] = v{k};" for slot, k in program.outputs.items()]
-        return "\n".join([f"ACTION {name}(LANE s) {{", *(f"  {each}" for each in lines), "}"])
     largest = [f"VALUE m{slot} = 0.0;" for slot in program.outputs]
     lines += [
         f"if (v{k} > m{slot} || v{k} != v{k}) m{slot} = v{k};"
@@ -201,8 +297,8 @@ def _constant(value: float) -> str:
     return "NOTHING" if math.isnan(value) else "INFINITY" if value > 0.0 else "(-INFINITY)"
 
 
-def _drive(slots: Sequence[int], motion: Motion, factor: float) -> Iterator[str]:
-    """Yield the lines that set the five numbers of a driver at time t."""
+def _drive(k: int, slots: Sequence[int], motion: Motion, factor: float) -> Iterator[str]:
+    """Yield the lines that set the five numbers of the k-th driver at time t."""
     shift = 0.0
     if isinstance(motion, Absolute):
         motion, shift = motion.motion, motion.design
@@ -212,6 +308,16 @@ def _drive(slots: Sequence[int], motion: Motion, factor: float) -> Iterator[str]
         x = f"{motion.amplitude!r} * sin{angle} - {shift!r}"
         v = f"{motion.amplitude * w!r} * cos{angle}"
         a = f"{-motion.amplitude * w * w!r} * sin{angle}"
+    elif isinstance(motion, Table):
+        yield f"COUNT i{k} = 0;"
+        yield f"while (i{k} < {len(motion.times) - 2} && t > KNOTS_{k}[i{k} + 1]) i{k}++;"
+        yield f"REAL h{k} = t - KNOTS_{k}[i{k}];"
+        c3, c2, c1, c0 = (f"PIECES_{k}[4 * i{k} + {j}]" for j in range(4))
+        first, last = motion.span
+        known = f"t >= {first!r} && t <= {last!r}"
+        x = f"({known} ? (({c3} * h{k} + {c2}) * h{k} + {c1}) * h{k} + {c0} - {shift!r} : NOTHING)"
+        v = f"(3.0 * {c3} * h{k} + 2.0 * {c2}) * h{k} + {c1}"
+        a = f"6.0 * {c3} * h{k} + 2.0 * {c2}"
     else:
         assert isinstance(motion, Ramp)
         x, v, a = f"{motion.rate!r} * t - {shift!r}", repr(motion.rate), "0.0"
@@ -276,10 +382,10 @@ def _function(head: str, body: Iterable[str]) -> str:
 def steps_text(solved: SolvedCase) -> str:
     """Return the functions of a lane: programs, samples, steps and outputs."""
     time = solved.model.slots[TIME]
-    drives = [line for each in solved.drives() for line in _drive(*each)]
+    drives = [line for k, each in enumerate(solved.drives()) for line in _drive(k, *each)]
     kept = [line for each in solved.outputs for line in _kept(each)]
     told = [line for k, each in enumerate(solved.outputs) for line in _told(k, each)]
-    programs = [program_text(name, each) for name, each in solved.programs.items()]
+    programs = [text for each in solved.programs.items() for text in _by_choice(*each)]
     parts = [
         *programs,
         _function("ACTION sample(LANE s, NUMBER t)", ["VALUE x;", f"s[{time}] = t;", *drives]),
@@ -289,6 +395,11 @@ def steps_text(solved: SolvedCase) -> str:
         parts.append(_function("ACTION keep(LANE n, FROM w, NUMBER h)", ["VALUE x;", *kept]))
     else:
         steps = steps.replace("      keep(n, w, to - w[AT]);\n", "")
+    has_choices = bool(solved.others)
+    prepare = "prepare(n);" if solved.parameters else ""
+    renew = BETTER_ROWS.replace("PREPARE", prepare).lstrip()
+    steps = steps.replace("TRY_BETTER_ROWS", TRY_BETTER_ROWS if has_choices else "")
+    steps = steps.replace("BETTER_ROWS\n", renew if has_choices else "")
     if solved.parameters:
         values = (0.0, 0.0, 0.0, 1.0, 0.0)
         still = [
@@ -305,7 +416,7 @@ def steps_text(solved: SolvedCase) -> str:
         ]
         parts.append(_function("ACTION move_geometry(LANE s, WHOLE which, NUMBER change)", moved))
     own = ["VALUE x;"] if any(line.startswith("x =") for line in told) else []
-    own += ["SCRATCH"] if any(each.completion for each in solved.outputs) else []
+    own += ["SCRATCH(c, 12);"] if any(each.completion for each in solved.outputs) else []
     parts += [steps, _function("ACTION tell(FROM s, LANE out, NUMBER r)", [*own, *told])]
     return "\n\n".join(parts)
 
@@ -313,7 +424,15 @@ def steps_text(solved: SolvedCase) -> str:
 def tables(solved: SolvedCase) -> dict[str, Sequence[float]]:
     """Return the tables of the code by name: whole numbers but for the start."""
     carried = solved.model.plan.carried
+    motions = dict[str, Sequence[float]]()
+    for k, (_, motion, _) in enumerate(solved.drives()):
+        plain = motion.motion if isinstance(motion, Absolute) else motion
+        if isinstance(plain, Table):
+            motions |= {f"KNOTS_{k}": plain.times, f"PIECES_{k}": plain.pieces}
+    standing = {"STANDING": solved.standing} if solved.others else {}
     return {
+        **standing,
+        **motions,
         "CARRY_FROM": [source for source, _ in carried],
         "CARRY_TO": [target for _, target in carried],
         "START": solved.start,

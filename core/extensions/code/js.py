@@ -11,7 +11,7 @@ from .dialects import JAVASCRIPT, steps_text, tables, words_of
 from .solved import SolvedCase, solved_case
 
 CLASS = """
-export class Mechanism {{
+class Mechanism {{
   /* the state is three lanes, then the value of each parameter, then whether the start closes */
   constructor() {{
     this.state = new Float64Array(3 * SIZE + PARAMETERS + 1);
@@ -30,11 +30,11 @@ export class Mechanism {{
   }}
   /* 0, and three numbers of each output: value, velocity and acceleration; or 1: the iteration does
      not converge, 2: a lock-up or another branch is in between. State and outputs then stay. */
-  move(driver, rate, outputs) {{
+  move(driver, rate, outputs, most = HALVINGS) {{
     const [s, w, n] = this.lanes, goal = (driver - DESIGN) / PACE, r = rate / PACE;
     if (!Number.isFinite(goal) || !Number.isFinite(r) || !(this.values[PARAMETERS] > 0)) return 1;
     copy(w, s);
-    const failed = travel(w, n, goal);
+    const failed = travel(w, n, goal, most);
     if (failed) return failed;
     copy(s, w);
     tell(s, outputs, r);
@@ -44,14 +44,16 @@ export class Mechanism {{
   parameter(which) {{ return PARAMETER_NAMES[which] ?? ""; }}
   nominal(which) {{ return NOMINAL[which] ?? NaN; }}
   /* the state returns to the design position */
-  set(which, value) {{{set}}}
-}}
-export default Mechanism;
-"""
-SET = """
+  set(which, value) {{
     if (!(which >= 0 && which < PARAMETERS)) return;
-    const s = this.lanes[0];
     this.values[which] = value;
+    this.stand();
+  }}
+  stand() {{{stand}}}
+}}
+"""
+STAND = """
+    const s = this.lanes[0];
     copy(s, START);
     for (let k = 0; k < PARAMETERS; k++) move_geometry(s, k, this.values[k] - NOMINAL[k]);
     this.values[PARAMETERS] = assemble(s);
@@ -65,18 +67,18 @@ def files(case: Case, places: Sequence[str]) -> Mapping[str, bytes]:
     Raises:
         KincheckError: the case has a part that the code cannot have.
     """
-    return {f"{identifier(case.name)}.mjs": source(solved_case(case, places)).encode()}
+    text = source(solved_case(case, places)) + "export { Mechanism, Mechanism as default };\n"
+    return {f"{identifier(case.name)}.mjs": text.encode()}
 
 
 def source(solved: SolvedCase) -> str:
-    """Return the module."""
+    """Return the text of the class `Mechanism`, and all that it takes."""
     known = tables(solved) | {"NOMINAL": [each.nominal for each in solved.parameters]}
     outputs, parameters = words_of(solved)
     return "\n".join(
         [
             f"/* {solved.case.name}, written by kincheck: lengths in m, angles in rad */",
             *(f"const {key} = {value!r};" for key, value in solved.numbers.items()),
-            f"const CARRIED = {len(known['CARRY_TO'])};",
             *(
                 JAVASCRIPT.table.format(name=table, numbers=", ".join(map(repr, values)))
                 for table, values in known.items()
@@ -84,9 +86,7 @@ def source(solved: SolvedCase) -> str:
             f"const NAMES = {json.dumps(outputs)};",
             f"const PARAMETER_NAMES = {json.dumps(parameters)};",
             "",
-            JAVASCRIPT.text(steps_text(solved)).replace(
-                "SCRATCH", "const c = new Float64Array(12);"
-            ),
-            CLASS.format(set=SET if solved.parameters else ""),
+            JAVASCRIPT.text(steps_text(solved)),
+            CLASS.format(stand=STAND if solved.parameters else ""),
         ]
     )

@@ -21,25 +21,31 @@ from ...case.measures import Orientation
 from ...errors import KincheckError, shortened
 from ...jet import Jet, arctan2, sqrt
 from ...joints.base import Kind
-from ...kinematics.compiled.compiled_model import ASSEMBLING, CLOSED, Model
+from ...kinematics.compiled.compiled_model import ASSEMBLING, CLOSED, Model, recent_model
 from ...kinematics.compiled.request import (
-    EARLIER,
+    ACCEPT,
+    CONSISTENT,
     FROM,
     LARGEST_SIGMA,
     OUTPUT,
     RESTING,
     SIGMA,
-    TIME,
     accept_by,
+    slots_of,
 )
-from ...mechanism.motions import Absolute, Motion, Ramp, Sine
+from ...kinematics.continuation.segments import BETTER, NEAR, Followed
+from ...kinematics.continuation.walk import follow_samples
+from ...kinematics.formulation.acceptance_criteria import LOW
+from ...mechanism.motions import Absolute, Motion, Ramp, Sine, Table
 from ...program import DONE, MARGIN, Program, Tape, program, where_larger
 from ...trajectory import QUANTITIES
-from ..sweep.curves import prepare_curves
+from ..sweep.curves import moved_by
 from ..sweep.varied_places import Geometry
 
 TOL = 1e-12
 """Largest accepted residual, as of `kincheck run`."""
+HALVINGS = 40
+"""Most halvings of a step in a row: what is left of it is no step in double precision."""
 SMALL = 1e-4
 """Square of the sine of half an angle below which three terms of the series of an angle over its
 sine give all digits: the fourth is 35/576 of its cube.
@@ -93,29 +99,66 @@ class SolvedCase:
     parameters: Sequence[Parameter]
     begin: float
     """Time at which the mechanism is at its design position [s]."""
+    poses: Mapping[str, Sequence[int]]
+    """Slots of origin [m] and Euler parameters, by body."""
+    others: Sequence[Model]
+    """Models with other choices of the independent rows, where one does not hold over the sweep."""
 
     @property
     def size(self) -> int:
         """Numbers of a lane: the slots, the time, and the kept numbers of outputs."""
         kept = [each.kept + (4 if each.completion else 1) for each in self.outputs if each.kept]
-        return max([self.at + 1, *kept])
+        return max([self.at + 2, *kept])
 
     @property
     def at(self) -> int:
-        """The number behind the slots that holds the time of the lane."""
+        """The number behind the slots that holds the time of the lane; the choice of its rows is
+        the next.
+        """
         return len(self.model.slots)
 
     @property
-    def programs(self) -> Mapping[str, Program]:
-        """The programs in use, by their names in the code."""
-        plan = self.model.plan
-        names = ["predict", "newton", "outputs", *plan.alone]
-        names += ["prepare"] if "prepare" in plan.programs else []
-        found = {name: plan.programs[name] for name in names}
+    def programs(self) -> Mapping[str, Sequence[Program]]:
+        """The programs in use, by their names in the code: one, or one for each choice of rows."""
+        names = ["predict", "newton", "outputs", *self.model.plan.alone]
+        names += ["prepare"] if "prepare" in self.model.plan.programs else []
+        found = {name: self._by_choice(name) for name in names}
         for k, each in enumerate(self.outputs):
             if each.completion is not None:
-                found[f"complete_{k}"] = each.completion
+                found[f"complete_{k}"] = [each.completion]
         return found
+
+    def _by_choice(self, name: str) -> Sequence[Program]:
+        """Return a program for each choice, on the slots of the first; one if they are equal."""
+        first, own = self.model.plan.programs[name], self.model.slots
+        found = [first]
+        for model in self.others:
+            slots = {slot: own[each] for each, slot in model.slots.items()}
+            other = model.plan.programs[name]
+            nodes = [
+                (op, slots[int(read[0])]) if op == "input" else (op, *read)
+                for op, *read in other.nodes
+            ]
+            outputs = {slots[slot]: k for slot, k in other.outputs.items()}
+            found.append(replace(other, nodes=tuple(nodes), outputs=outputs))
+        is_same = all(
+            (each.nodes, each.outputs) == (first.nodes, first.outputs) for each in found[1:]
+        )
+        return found[:1] if is_same else found
+
+    @property
+    def state(self) -> list[int]:
+        """Slots of the solved pose."""
+        return slots_of(self.model.vectors, self.model.state)
+
+    @property
+    def standing(self) -> list[int]:
+        """Numbers of a lane that stay with another choice of rows: pose, geometry, limits, and what
+        follows the slots.
+        """
+        given = [*self.model.prescribed, *self.model.varied]
+        slots = [*self.state, *slots_of(self.model.vectors, given)]
+        return [*slots, *(self.model.slots[name] for name in ACCEPT), *range(self.at, self.size)]
 
     @cached_property
     def start(self) -> list[float]:
@@ -138,15 +181,25 @@ class SolvedCase:
         slots, plan = self.model.slots, self.model.plan
         named = {"RESIDUAL": "residual", "CLOSURE": "closure", "BRANCH": "branch"}
         named |= {"IS_DONE": DONE, "MARGIN": MARGIN, "SIGMA": FROM + SIGMA}
-        named |= {"LARGEST": FROM + LARGEST_SIGMA, "HERE": FROM + TIME, "EARLIER": EARLIER + TIME}
+        named |= {"LEFTOVER": "leftover", "LARGEST_NOW": LARGEST_SIGMA}
+        named |= {"LARGEST": FROM + LARGEST_SIGMA}
         sweep = self.case.sweep
         return {name: slots[slot] for name, slot in named.items()} | {
             "SIZE": self.size,
             "AT": self.at,
+            "CHOICE": self.at + 1,
+            "CHOICES": 1 + len(self.others),
             "MOST": plan.most,
+            "HALVINGS": HALVINGS,
             "TOLERANCE": plan.tolerance,
             "ASSEMBLING": ASSEMBLING,
             "CLOSED": CLOSED,
+            "CARRIED": len(plan.carried),
+            "POSE": len(self.state),
+            "STAYING": len(self.standing),
+            "CONSISTENT": CONSISTENT,
+            "NEAR": NEAR,
+            "BETTER": BETTER,
             "OUTPUTS": len(self.outputs),
             "PARAMETERS": len(self.parameters),
             "DESIGN": 0.0 if sweep.driver == SWEPT_TIME else sweep.design,
@@ -173,11 +226,12 @@ class SolvedCase:
         return found
 
 
-def solved_case(case: Case, places: Sequence[str]) -> SolvedCase:
+def solved_case(case: Case, places: Sequence[str], bodies: Sequence[str] = ()) -> SolvedCase:
     """Return a case ready to be written as code.
 
     Args:
         places: names of the parameters, see `kincheck.curves`.
+        bodies: names of those whose poses are wanted.
 
     Raises:
         KincheckError: the case has a part that the code cannot have, or a place is unknown.
@@ -185,10 +239,10 @@ def solved_case(case: Case, places: Sequence[str]) -> SolvedCase:
     path = case.sweep.path
     for name, motion in path.motions.items():
         plain = motion.motion if isinstance(motion, Absolute) else motion
-        if not isinstance(plain, Ramp | Sine):
+        if not isinstance(plain, Ramp | Sine | Table):
             raise KincheckError(
                 f"{case.name}: the driver {name} follows a {type(plain).__name__.lower()}, which"
-                " code cannot have. Give it a ramp or a sine, or sweep it."
+                " code cannot have. Give it a table, a ramp or a sine, or sweep it."
             )
     measured = tuple(each for each in case.outputs if not each.forces)
     if not measured:
@@ -198,29 +252,45 @@ def solved_case(case: Case, places: Sequence[str]) -> SolvedCase:
             " output of the motion."
         )
     case = replace(case, outputs=measured)
-    parameters: list[Parameter] = []
+    varied, moves, units = list[str](), np.empty((0, 0)), dict[str, str]()
     if places:
-        ready = prepare_curves(case, places)
-        varied = [*ready.outputs.designs.route.model.varied]
-        made = DesignOutputs.of(case, varied, derivative=2)
-        slots, geometry = made.designs.route.model.geometry, Geometry(case)
-        for k, (name, unit) in enumerate(ready.units.items()):
-            moves = {slots[i]: float(x) for i, x in enumerate(ready.moves[:, k]) if x}
-            parameters.append(Parameter(name, unit, _nominal(geometry, name), moves))
-    else:
-        made = DesignOutputs.of(case, (), derivative=2)
+        varied, _, moves, units = moved_by(case, places)
+    made = DesignOutputs.of(case, varied, derivative=2, bodies=bodies)
     route = made.designs.route
     if route.begin.lead is not None:
         raise KincheckError(
             f"{case.name}: the motion does not begin at the design position. Change the drivers"
             " so that they have their design values at one time."
         )
-    model, kept = route.model, len(route.model.slots) + 1
+    model, kept = route.model, len(route.model.slots) + 2
+    geometry, parameters = Geometry(case), list[Parameter]()
+    for k, (name, unit) in enumerate(units.items()):
+        moved = {model.geometry[i]: float(x) for i, x in enumerate(moves[:, k]) if x}
+        parameters.append(Parameter(name, unit, _nominal(geometry, name), moved))
     outputs: list[CodeOutput] = []
     for each in measured:
         outputs.append(found := _output(model, each, kept))
         kept += 4 if found.completion else 1 if found.period else 0
-    return SolvedCase(case, model, outputs, parameters, route.begin.time)
+    poses = {
+        name: [slot for part in "rp" for slot in model.plan.kept[model.rows[f"{part} {name}"]]]
+        for name in bodies
+    }
+    others = [
+        recent_model(model.mechanism, replace(model.request, rows=rows))
+        for rows in _other_rows(case, model)
+    ]
+    return SolvedCase(case, model, outputs, parameters, route.begin.time, poses, others)
+
+
+def _other_rows(case: Case, model: Model) -> list[tuple[int, ...]]:
+    """Return the further choices of independent rows that native takes over the sweep."""
+    if not model.selection.dropped:
+        return []
+    route = DesignOutputs.of(case, (), derivative=2).designs.route
+    followed = Followed(route, follow_samples(route, TOL, low=LOW), TOL)
+    followed.go_on()
+    followed.renew(followed.visit(np.flatnonzero(followed.needs_check).tolist()))
+    return [each.selection.chosen for each in followed.models[1:]]
 
 
 def _nominal(geometry: Geometry, name: str) -> float:

@@ -14,12 +14,12 @@ import numpy as np
 from ...case.case import MARKER, PER_TRAVEL, Case
 from ...case.units import LENGTHS
 from ...dataset import Dataset, Variable
+from ...harness.labels import in_table_units, shorten_names
 from ...harness.labels import notes as notes_of
-from ...harness.labels import shorten_names
 from ...harness.record import Facts, Results
 from ...joints import Kind
 from ...kinematics import kinds, places
-from ...report.axis import ZERO, driver_axis, events, in_table_units, number
+from ...report.axis import ZERO, driver_axis, events, number
 from ...report.curves import columns_of
 from ...report.figures import Style, output_figure
 from ...report.page_model import Plot

@@ -4,7 +4,8 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["hardpoints"],
+    needs=["hardpoints", "statics"],
+    sections={"compliance": "section:SECTION"},
     commands={"kc": "command:MeasureCompliance"},
     public={"compliance": "command:compliance"},
 )

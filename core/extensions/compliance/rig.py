@@ -20,13 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...case.case import Case, Load, Rig
+from ...case.case import Case
 from ...errors import KincheckError
-from ...kinematics import LoadPoint
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.mechanism import Mechanism, Point, Vector
 from ...mechanism.motions import PointCoordinate
 from ...trajectory import Array
 from ..hardpoints.suspension import Convention, Reaction, SuspensionOutput, Vehicle
+from .section import Load, Rig, rig_of
 
 PER: Mapping[Load, str] = {
     Load.LONGITUDINAL: ".per_longitudinal_force",
@@ -68,10 +68,10 @@ class Wheel:
     vehicle: Vehicle | None
 
     @property
-    def points(self) -> list[LoadPoint]:
+    def points(self) -> list[Point]:
         """The places of its loads."""
         places = ((CONTACT, self.contact), (CENTER, self.center))
-        return [LoadPoint(f"{self.name}{what}", self.body, place) for what, place in places]
+        return [Point(f"{self.name}{what}", self.body, place) for what, place in places]
 
     def unit(self, load: Load) -> tuple[str, Array]:
         """Return the load point of a load, and the force and torque of its unit, shape (6,)."""
@@ -109,7 +109,7 @@ def wheels_of(case: Case, held: Sequence[str], soft: Mechanism) -> list[Wheel]:
     Raises:
         KincheckError: the case does not tell the wheel's place, or nothing holds its height.
     """
-    rig = case.rig or Rig()
+    rig = rig_of(case)
     vehicles = _vehicles(case)
     if rig.wheel is not None and vehicles:
         on_body = [v for v in vehicles if soft.point(v.wheel_center).body == rig.wheel]

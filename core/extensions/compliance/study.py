@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...case.case import HELD_BUT, TIME, Balance, Case, Load, Rig, Sweep, Truth
+from ...case.case import HELD_BUT, TIME, Balance, Case, Sweep, Truth
 from ...case.measures import DriverEffort, ForceMeasure
 from ...case.quantity import (
     ORDERS,
@@ -34,13 +34,15 @@ from ...case.quantity import (
 from ...errors import KincheckError, SolveError, number_of
 from ...harness.record import Results
 from ...jet import Jet
-from ...kinematics import Equilibria, StaticModel, solve
+from ...kinematics import solve
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Motion, Ramp
 from ...trajectory import Array, PointMotion
 from ..hardpoints.suspension import PerTravel
+from ..statics.equilibrium import Equilibria, StaticModel
 from .rates import SIDES, Curve, wheel_rates
 from .rig import CONTACT, PER, Wheel, held_drivers, wheels_of
+from .section import Load, rig_of
 
 # Engines agree on equilibria to round-off of their positions, which stiffness turns into forces.
 WITHIN, SAME_LOAD, ROUND_OFF = 1e-12, 1e-9, 1e-15
@@ -53,7 +55,6 @@ WHEEL_LOAD = "wheel_load"
 """Name of the first curve, which a driver's effort in a case may have as well."""
 NOT_COMPUTED = "not computed: "
 """Before the outputs without a curve, in notes."""
-SHARED = "redundant rows share its load; kincheck run --static tells what is determined"
 NO_VALUE = "it has no value at any of these samples, by its definition"
 
 
@@ -97,6 +98,14 @@ class ComplianceCurves:
     failures: tuple[str, ...]
     notes: tuple[str, ...]
     turning: bool = False
+
+    @property
+    def lost(self) -> list[str]:
+        """A line for each reason of outputs without a curve."""
+        names: dict[str, list[str]] = {}
+        for name, reason in self.not_computed.items():
+            names.setdefault(reason, []).append(name)
+        return [f"{NOT_COMPUTED}{', '.join(each)}: {why}" for why, each in names.items()]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -173,7 +182,7 @@ def _load_text(load: Load, value: float) -> str:
 
 class _Study:
     def __init__(self, case: Case, axle: AxleMotion) -> None:
-        self.case, self.axle, self.rig = case, axle, case.rig or Rig()
+        self.case, self.axle, self.rig = case, axle, rig_of(case)
         soft = case.mechanism.released()
         held = held_drivers(case, self.rig, soft)
         self.wheels = wheels_of(case, held, soft)
@@ -308,9 +317,10 @@ class _Study:
             if found.reached.any() and not np.isfinite(each.values[found.reached]).any()
         }
         shared = {
-            x.name: SHARED
+            x.name: f"joint {x.read!r}: {reason}"
             for x in self.computed
-            if isinstance(x, ForceMeasure) and x.undetermined(found.forces)
+            if isinstance(x, ForceMeasure)
+            and (reason := self._placed(x, found).undetermined(found.forces))
         }
         not_computed = {**self.lacking, **none, **shared}
 
@@ -329,9 +339,6 @@ class _Study:
             if way and ok
         ]
         notes = [f"{unstable[0]}; {len(unstable)} samples in all"] if unstable else []
-        for reason in dict.fromkeys(not_computed.values()):
-            names = [name for name, why in not_computed.items() if why == reason]
-            notes.append(f"{NOT_COMPUTED}{', '.join(names)}: {reason}")
         if not self.mechanism.forces:
             notes.append(
                 "nothing is elastic: there is no bushing and no spring, so nothing gives way to a"
@@ -340,7 +347,7 @@ class _Study:
         if self.model.equations.dropped:
             notes.append(
                 f"{len(self.model.equations.dropped)} redundant rows are left out: displacements"
-                " are unique, reactions of these joints are not"
+                " are unique, and what these rows share of the reactions is not"
             )
         return ComplianceCurves(
             axis,
@@ -394,7 +401,7 @@ class _Study:
         curves = dict[str, Curve]()
         for output in self.computed:
             if isinstance(output, ForceMeasure):
-                values = self._force(output, found)
+                values = self._placed(output, found).values(found.forces)
                 curves[output.name] = Curve(values, output.unit, output.sense)
                 continue
             alone = [found.by_driver[name][0] for name in output.facts.get(HELD_BUT, ())]
@@ -411,17 +418,18 @@ class _Study:
                 curves[f"{output.name}{PER[load]}"] = Curve(slope, unit, sense)
         return curves
 
-    def _force(self, output: ForceMeasure, found: Equilibria) -> Array:
+    def _placed(self, output: ForceMeasure, found: Equilibria) -> ForceMeasure:
+        """Return a force with the axes and points that it follows."""
         if output.follows_points:
             places = {
                 name: found.place(point.body, point.position)
                 for name in output.points
                 for point in (self.mechanism.point(name),)
             }
-            output = output.with_points(
+            return output.with_points(
                 {name: point_jets(PointMotion(x, None, None)) for name, x in places.items()}
             )
-        return output.values(found.forces)
+        return output
 
     def _value(self, output: Quantity, found: Equilibria, step: Array) -> Jet:
         """Return an output, with its slope by a motion of the unknowns in place of its rate."""

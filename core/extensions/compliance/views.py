@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ...case.case import Load
 from ...errors import number_of
 from ...harness.record import Record, Results
 from ...report.axis import ZERO
@@ -21,7 +20,8 @@ from ...report.sections import page as render
 from ...trajectory import Array
 from ...unit_text import with_unit
 from .rates import Curve
-from .study import MOST_SAID, NOT_COMPUTED, WHEEL_LOAD, ComplianceCurves, ComplianceResults
+from .section import Load
+from .study import MOST_SAID, WHEEL_LOAD, ComplianceCurves, ComplianceResults
 
 SCHEMA = "kincheck-compliance/1"
 DEGREE = 180.0 / math.pi
@@ -122,8 +122,8 @@ def table(results: ComplianceResults) -> str:
     names = {name: _shown(each.unit) for name, each in first.outputs.items() if name != WHEEL_LOAD}
     heads = [with_unit(name, unit) for name, (unit, _) in names.items()]
     heads += [with_unit(f"{name}.rigid", names[name][0]) for name in first.rigid]
-    missing = [note for note in first.notes if note.startswith(NOT_COMPUTED)]
-    if said := "; ".join(filter(None, (results.signs, *missing))):
+    lost = (line for each in (first, *results.loads.values()) for line in each.lost)
+    if said := "; ".join(filter(None, (results.signs, *dict.fromkeys(lost)))):
         text.write(f"# {said}\n")
     writer.writerow(["over", "value", "unit", *center, f"{WHEEL_LOAD} [N]", *heads])
     for curves in (first, *results.loads.values()):
@@ -159,8 +159,10 @@ def failures(results: ComplianceResults) -> list[str]:
 def lines(results: ComplianceResults) -> Iterator[str]:
     """Yield the slopes and rates at the sample nearest to design, and the ends of each curve."""
     yield f"{results.case}: {results.signs}"
-    for curves in (results.travel, *results.loads.values()):
+    every = (results.travel, *results.loads.values())
+    for curves in every:
         yield from _lines(curves)
+    yield from dict.fromkeys(line for curves in every for line in curves.lost)
 
 
 def _lines(curves: ComplianceCurves) -> Iterator[str]:
@@ -233,7 +235,7 @@ def _section(number: int, curves: ComplianceCurves) -> Section:
         plot = Plot(f"curve-{number}-{len(diagrams)}", f"{name} over {curves.axis}", "")
         diagrams.append(Diagram(plot, figure, styles))
     title = f"Over {curves.axis}"
-    return Section(title, curves.failures, curves.notes, [], 0, [], diagrams)
+    return Section(title, curves.failures, [*curves.notes, *curves.lost], [], 0, [], diagrams)
 
 
 def _agreement(checked: Results) -> Section:

@@ -31,7 +31,7 @@ _GOAL = re.compile(
     r"(?:\+-|\+/-|±)\s*(?P<tolerance>.+?)\s*"
 )
 _MOVE = re.compile(
-    r"\s*(?P<points>[^:]+?)\s*:\s*(?P<axes>[xyz](?:[\s,]*[xyz])*)?\s*(?:\+-|\+/-|±)\s*(?P<box>.+?)\s*"
+    r"\s*(?P<points>[^:]+?)\s*:\s*(?P<axes>[xyz](?:[\s,]*[xyz])*)?\s*(?:(?:\+-|\+/-|±)\s*(?P<box>.+?)\s*)?"
 )
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
@@ -114,8 +114,11 @@ def read_goals(
     return case, goals, notes
 
 
-def read_moves(texts: Sequence[str], case: Case) -> dict[str, float]:
+def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, float]:
     """Return the half-width of the box of each place that may move [m].
+
+    Args:
+        usual: box of moves without one.
 
     Raises:
         KincheckError: a move has another form, there is no such row, or it is given twice.
@@ -126,20 +129,12 @@ def read_moves(texts: Sequence[str], case: Case) -> dict[str, float]:
     found = dict[str, float]()
     for text in texts:
         read = _MOVE.fullmatch(text)
-        if read is None:
+        if read is None or not (read["box"] or usual):
             raise KincheckError(
                 f"move {text!r}: expected points, axes and a box; say {MOVE}, such as"
                 ' "tierod_inner: y z +- 15 mm"'
             )
-        try:
-            box = measure(read["box"], LENGTHS, case.length_unit)[0]
-        except ValueError:
-            box = np.nan
-        if not 0.0 < box < np.inf:
-            raise KincheckError(
-                f"move {text!r}: found the box {read['box']!r}, expected a positive length with a"
-                f" unit; say +- 15 {case.length_unit}"
-            )
+        box = read_box(read["box"] or usual, f"move {text!r}", case)
         for name in re.split(r"\s*,\s*", read["points"]):
             if name not in rows:
                 raise KincheckError(f"move {text!r}: {unknown('point', name, rows)}")
@@ -152,6 +147,24 @@ def read_moves(texts: Sequence[str], case: Case) -> dict[str, float]:
                     raise KincheckError(f"move {text!r}: {place} is given twice; leave one out")
                 found[place] = box
     return found
+
+
+def read_box(text: str, what: str, case: Case) -> float:
+    """Return the half-width of a box [m].
+
+    Raises:
+        KincheckError: it is no positive length.
+    """
+    try:
+        box = measure(re.sub(r"^\s*(\+-|\+/-|±)", "", text), LENGTHS, case.length_unit)[0]
+    except ValueError:
+        box = np.nan
+    if not 0.0 < box < np.inf:
+        raise KincheckError(
+            f"{what}: found the box {text!r}, expected a positive length with a unit; say +- 15"
+            f" {case.length_unit}"
+        )
+    return box
 
 
 def _draft(text: str, case: Case) -> _Draft:
@@ -188,6 +201,12 @@ def _unit(text: str, name: str, case: Case, output: str) -> Unit:
         f"goal {text!r}: found the unit {name!r}, expected one of {output}, such as"
         f" {_of_table(si, case)}; correct it"
     )
+
+
+def unit_in_table(si: str, case: Case) -> Unit:
+    """Return the unit of an output as the table has it."""
+    found = read_unit(_of_table(si, case))
+    return found[0] if found is not None else Unit(si, 1.0, float)
 
 
 def _of_table(si: str, case: Case) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,28 +11,22 @@ import numpy as np
 from ...case.case import Case
 from ...case.units import Unit
 from ...cli.registry import Registry
-from ...cli.shared_options import TOL
 from ...errors import KincheckError
-from ...harness.record import Outcome, Results
 from ...report.axis import number
 from ...report.sections import Report
 from ...trajectory import Array
 from ..compare.designs import comparison, designs_of
 from ..hardpoints.options import WheelOptions
-from ..hardpoints.read import case_of_hardpoints
 from ..hardpoints.reader import read_hardpoints
-from ..hardpoints.table import Hardpoint, HardpointTable, unit_of
+from ..hardpoints.table import HardpointTable, unit_of
 from ..sweep.curves import curves
 from .goals import Goal, read_goals, read_moves
 from .least_move import HELD, LeastMove, least_move
+from .new_table import case_of_points, check, moved_points
 
-CHECKS = ("mujoco", "pinocchio", "exudyn")
-"""Engines that solve the answer again, the first that is installed."""
 TIGHT = 1e-5
 """A sample this close to an edge of its band, over the half-width, is tight."""
 SAME_NORM = 1e-6
-DIGITS = 12
-"""Digits of written coordinates: a thousandth of the accuracy of the bands and more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +123,8 @@ class Search:
     """The outputs of a case over their bands, by the moves over their boxes."""
 
     def __init__(self, case: Case, goals: Sequence[Goal], boxes: Mapping[str, float]) -> None:
-        self.case, self.goals, self.places = case, goals, [*boxes]
+        self.case, self.goals, self.boxes = case, goals, boxes
+        self.places = [*boxes]
         self.box = np.array([*boxes.values()])
         self.names = [*dict.fromkeys(each.output for each in goals)]
         self.designs = 0
@@ -146,7 +141,7 @@ class Search:
         usable = found.solved.all() and np.isfinite(g).all() and np.isfinite(slopes).all()
         return (g, slopes) if usable else None
 
-    def values(self, u: Array) -> dict[str, Array]:
+    def values(self, u: Array, remedy: str = "give a smaller --travel") -> dict[str, Array]:
         """Return the outputs of a design, shape (n,) each.
 
         Raises:
@@ -156,7 +151,7 @@ class Search:
         if not found.solved.all():
             raise KincheckError(
                 f"{self.case.name}: the table does not reach its whole travel"
-                f" ({found.messages.get(0, 'no reason given')}); give a smaller --travel"
+                f" ({found.messages.get(0, 'no reason given')}); {remedy}"
             )
         for each in self.goals:
             if not np.isfinite(found.values[each.output][0, each.at]).all():
@@ -201,7 +196,7 @@ def tune(
     table = read_hardpoints(file, supplied)
     length = unit_of(table, supplied.units)
     moves = dict(zip(boxes, (best.moves * search.box).tolist(), strict=True))
-    points = _moved(table, moves, length)
+    points = moved_points(table, moves, length)
     after = search.values(best.moves)
     bands = [
         _band(case, goal, before, after, worth)
@@ -209,8 +204,8 @@ def tune(
     ]
     checked, report = None, None
     if best.held:
-        new = _case_of(table, supplied, points, case, file)
-        checked, results = _checked(case, new, registry)
+        new = case_of_points(table, supplied, points, case, file)
+        checked, results = check(case, new, registry)
         notes += [] if checked else ["no other engine is installed that can check the new table"]
         report = comparison(designs_of(results, [case, new]), [])
     return Tuned(
@@ -241,66 +236,3 @@ def _band(
         float(values[off.argmax()]),
         worth / goal.tolerance,
     )
-
-
-def _moved(
-    table: HardpointTable, moves: Mapping[str, float], length: Unit
-) -> list[tuple[float, float, float]]:
-    """Return the points of the table with the moves, in its own units and axes."""
-    found = list[tuple[float, float, float]]()
-    for name, old in table.points.items():
-        x, y, z = (
-            float(f"{value + moves[place] / length.size:.{DIGITS}g}")
-            if (place := f"{name} {axis}") in moves
-            else value
-            for axis, value in zip("xyz", old.position, strict=True)
-        )
-        found.append((x, y, z))
-    return found
-
-
-def _case_of(
-    table: HardpointTable,
-    supplied: WheelOptions,
-    points: Sequence[tuple[float, float, float]],
-    case: Case,
-    file: Path,
-) -> Case:
-    """Return the case of the new table, read as the old one, at the same samples."""
-    rows = {
-        name: Hardpoint(row, table.points[name].where)
-        for name, row in zip(table.points, points, strict=True)
-    }
-    new = case_of_hardpoints(replace(table, points=rows), supplied)
-    return replace(
-        new,
-        name=f"{file.stem} tuned",
-        sweep=replace(new.sweep, values=case.sweep.values),
-        reference={},
-    )
-
-
-def _checked(old: Case, new: Case, registry: Registry) -> tuple[str | None, Results]:
-    """Return the engine that solved the new design again, and the results of the native one.
-
-    Raises:
-        KincheckError: an engine contradicts the native one.
-    """
-    from ...harness import run as running
-
-    native = registry.engine("native")
-    results = running.run([old, new], [native], tol=TOL)
-    for name in CHECKS:
-        if name not in registry.engines:
-            continue
-        engine = registry.engine(name)
-        if engine.version() is None or engine.unsupported(new) is not None:
-            continue
-        (record,) = running.run([new], [engine], tol=TOL, baseline=native).records
-        if record.outcome is not Outcome.PASS:
-            raise KincheckError(
-                f"{new.name}: {name} does not confirm the new table ({record.outcome}:"
-                f" {record.message}); nothing is written. Run kincheck run on both."
-            )
-        return name, results
-    return None, results

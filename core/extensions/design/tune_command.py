@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
-from ...errors import KincheckError, refuse
+from ...errors import refuse
 from ...options import destination, json_file, option, options, whole
+from .new_table import require_new, table_of
 
 if TYPE_CHECKING:
     from .tune import Tuned
@@ -58,19 +59,11 @@ class Tune(OfCase):
         from ..hardpoints.saving import write_table
         from .tune import tune
 
-        if self.out is not None and (self.out.exists() or self.out.suffix.lower() != ".csv"):
-            what = "the file exists and stays" if self.out.exists() else "is written as CSV"
-            raise KincheckError(f"--out {self.out}: {what}; give a new name that ends in .csv")
+        require_new(self.out)
         refuse(self.unwritable())
-        case = registry.case_of(self)
-        from ...case.case import Case
-
-        if isinstance(self.case, Case) or not case.hardpoints:
-            raise KincheckError(
-                f"{case.name}: is no table of hardpoints; give a table, such as car.csv"
-            )
+        case, file = table_of(self, registry)
         wanted = self.goal, self.move
-        found = tune(case, Path(self.case), self.supplied, wanted, self.starts, registry)
+        found = tune(case, file, self.supplied, wanted, self.starts, registry)
         if found.reached and self.out is not None:
             write_table(found.table, self.supplied, found.points, self.out, f"--out {self.out}")
         with with_json(_facts(found, self.out), self.json) as console:

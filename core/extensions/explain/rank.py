@@ -23,7 +23,6 @@ from ...kinematics.compiled.request import CONSISTENT
 from ...kinematics.formulation.cartesian import Cartesian
 from ...kinematics.formulation.constraints import Constraint, Frames, constraints_left_out, frames
 from ...kinematics.formulation.formulation import Configuration, State
-from ...kinematics.formulation.relative import Formulation
 from ...kinematics.formulation.state_vectors import jacobian
 from ...kinematics.structure.degrees_of_freedom import FreedomAccount, account
 from ...kinematics.structure.redundancy import (
@@ -71,7 +70,7 @@ class Screw:
         return f"{self.body!r} {how} about {along} through {_numbers(self.through)}{lead}"
 
 
-def screws(formulation: Formulation, at: Configuration, frame: Frames, rates: Array) -> list[Screw]:
+def screws(formulation: Cartesian, at: Configuration, frame: Frames, rates: Array) -> list[Screw]:
     """Return the motion of each moving body at the rates of the unknowns, shape (unknowns,), the
     fastest first.
 

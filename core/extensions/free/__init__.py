@@ -3,5 +3,8 @@
 from ...doors import Extension
 
 EXTENSION = Extension(
-    __name__, commands={"free": "command:MoveFreely"}, public={"free": "command:MoveFreely"}
+    __name__,
+    commands={"free": "command:MoveFreely"},
+    public={"free": "command:MoveFreely"},
+    sections={"free": "section:SECTION"},
 )

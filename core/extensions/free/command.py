@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,11 +54,11 @@ class MoveFreely(OfCase):
         Raises:
             KincheckError: duration or samples are missing, or the mechanism has no free motion.
         """
-        from ...case.case import Free
         from .free import free_of
+        from .section import Free, free_in, with_free
 
         case = registry.case_of(self, driven=False)
-        given = case.free
+        given = free_in(case)
         duration = self.duration or (given and given.duration)
         samples = self.samples or (given and given.samples)
         if not duration or not samples:
@@ -71,7 +71,7 @@ class MoveFreely(OfCase):
         rates = rates if self.rates is None else self.rates
         if not isinstance(rates, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise KincheckError(f"rates: found {rates!r}, expected {{DRIVER or JOINT: rate}}")
-        return free_of(replace(case, free=Free(duration, samples, rates)))
+        return free_of(with_free(case, Free(duration, samples, dict(rates))))
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""

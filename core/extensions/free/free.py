@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...case.case import HELD_BUT, TIME, Case, Free, Sweep
+from ...case.case import HELD_BUT, TIME, Case, Sweep
 from ...case.io.table_file import Kind, write_csv
 from ...dataset import Dataset, Variable
 from ...errors import KincheckError
@@ -17,6 +17,7 @@ from ...harness.compare import output_series
 from ...tabular import Tabular
 from ...trajectory import Array
 from .free_dynamics import free_motion
+from .section import free_in
 
 SCHEMA = "kincheck-free/1"
 
@@ -102,14 +103,14 @@ def free_of(case: Case) -> FreeResult:
         KincheckError: the case has no [free], or an output of the name of the time.
         SolveError: see `kinematics.free_motion`.
     """
-    if case.free is None:
+    free = free_in(case)
+    if free is None:
         raise KincheckError(
             f"case {case.name!r} says no duration of its free motion. Add [free] with duration and"
             " samples, or give --duration and --samples."
         )
     if TIME in (output.name for output in case.outputs):
         raise KincheckError(f"case {case.name!r}: an output is named {TIME!r}. Rename it.")
-    free: Free = case.free
     times = np.linspace(0.0, free.duration, free.samples)
     found = free_motion(case.mechanism, times, free.rates)
     drivers = {driver.name for driver in case.mechanism.drivers}

@@ -30,8 +30,7 @@ from ...kinematics.formulation.formulation import (
     motion_of_frame,
     motion_of_point,
 )
-from ...kinematics.formulation.state_vectors import columns_of, jacobian
-from ...kinematics.statics.equations import moved_most
+from ...kinematics.formulation.state_vectors import columns_of, jacobian, moved_most
 from ...mechanism.mechanism import Mechanism, coordinates
 from ...mechanism.motions import Driver
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive

@@ -152,7 +152,8 @@ def _workbook(file: Path, supplied: WheelOptions) -> HardpointTable:
 
 
 def _tree(file: Path, supplied: WheelOptions) -> HardpointTable:
-    from .tree import read_python, read_tree
+    from .scripts import read_python
+    from .tree import read_tree
 
     read = read_python if file.suffix.lower() == ".py" else read_tree
     return read(file, text_of(file), supplied)

@@ -33,7 +33,7 @@ from ...case.io.table import (
     trim,
 )
 from ...case.units import LENGTHS
-from ...errors import MOST_NAMED, OpenError, brief, shortened
+from ...errors import MOST_NAMED, OpenError, brief, number_of, shortened
 from .options import NOTHING, WheelOptions
 from .programs import plain_lines
 from .table import (
@@ -49,7 +49,7 @@ from .table import (
     wanted_corner,
 )
 from .templates import ROLES, agree, compact, corner_of, head_of_corner, kind_of_head
-from .tree import FEWEST, axis_of, is_assignments, read_assignments
+from .tree import FEWEST, add_fact, axis_of, is_assignments, read_assignments
 from .words import fact_of
 
 COMMENTS = ("#", "%", "//")
@@ -109,11 +109,12 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
         CaseError: no head, or a row at odds with the head.
     """
     table = text_table(file, text.splitlines(), COMMENTS, _delimiter)
-    facts = dict[str, str]()
+    facts, remarks = dict[str, str](), 0
     for comment in table.comments:
         bare = comment.strip('" \t\r').lstrip("".join(COMMENTS)).rstrip(f'"{DELIMITERS}')
         if fact := fact_of(_SIGNS.sub(",", bare)):
-            facts.update([fact])
+            add_fact(file, "", facts, fact)
+        remarks += fact is None and bool(bare.strip())
     lines = [
         (f"line {k}", line)
         for k, line in enumerate(table.lines, 1)
@@ -140,7 +141,11 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
             "--sheet",
             f"found {shown(supplied.sheet)} for a table of text, expected none; leave it out",
         )
-    return read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
+    found = read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
+    if remarks:
+        said = f"{number_of(remarks, 'line')} of comments"
+        found = replace(found, left_out=[*found.left_out, said])
+    return found
 
 
 def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:
@@ -182,7 +187,8 @@ def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:
     found = read_rows(sheet, f"Sheet {shown(sheet.name)}:", {}, supplied)
     if found.corner is None and (corner := corners[sheet.name]):
         found = replace(found, corner=corner, side=found.side or corner[1] or None)
-    return found
+    others = [f"sheet {shown(each.name)}" for each in sheets if each.name != sheet.name]
+    return replace(found, left_out=[*found.left_out, *others])
 
 
 def _delimiter(table: Table) -> str:
@@ -255,7 +261,7 @@ def read_rows(
     left_out = list[str]()
     for where, cells in above:
         if fact := fact_of(_row_text([cell for cell in cells if cell != ""])):
-            facts.setdefault(*fact)
+            add_fact(file, where, facts, fact)
         else:
             left_out.append(_note(where, cells))
     unit = head.unit
@@ -305,6 +311,13 @@ def read_rows(
     of_corners = head.of_corners if chosen else []
     columns = [name for k, name in enumerate(head.names) if k not in of_corners]
     left_out += [f"column {brief(name)}" for name in head.others if name in columns]
+    headless = {
+        k
+        for _, cells in body
+        for k in range(len(head.names), len(cells))
+        if cells[k] != "" and k not in head.columns
+    }
+    left_out += [f"column {k + 1}, which has no head" for k in sorted(headless)]
     return HardpointTable(
         *(file, tool, points, unit or facts.get("unit")),
         *(facts.get("axes"), facts.get("template"), left_out),
@@ -493,12 +506,14 @@ def _by_coordinate(file: Path, rows: Sequence[Row]) -> _Parts | None:
     """Return the points of rows with one coordinate each."""
     points = dict[str, dict[str, tuple[str, Cell]]]()
     units = dict[str, str]()
-    others = list[Row]()
+    others, remarks = list[Row](), list[Row]()
     for where, cells in rows:
         if (coordinate := _coordinate(cells)) is None:
             others.append((where, cells))
             continue
-        name, axis, values, unit = coordinate
+        name, axis, values, unit, more = coordinate
+        if more:
+            remarks.append((where, more))
         if len(values) > 1:
             raise fault(
                 file,
@@ -527,11 +542,13 @@ def _by_coordinate(file: Path, rows: Sequence[Row]) -> _Parts | None:
             raise incomplete(file, next(iter(place.values()))[0], name, place)
         else:
             others += [(where, [f"{name} {axis}"]) for axis, (where, _) in place.items()]
-    return Head("the head", range(4), HEAD, unit), others, body
+    return Head("the head", range(4), HEAD, unit), [*others, *remarks], body
 
 
-def _coordinate(cells: Sequence[Cell]) -> tuple[str, str, list[Cell], str] | None:
-    """Return name, axis, numbers and unit of a row of a coordinate; None for another row."""
+def _coordinate(cells: Sequence[Cell]) -> tuple[str, str, list[Cell], str, list[Cell]] | None:
+    """Return name, axis, numbers, unit and further cells of a row of a coordinate; None for another
+    row.
+    """
     filled = [cell for cell in cells if cell != ""]
     if len(filled) < 2 or not isinstance(filled[0], str) or is_number(filled[0]):
         return None
@@ -544,9 +561,10 @@ def _coordinate(cells: Sequence[Cell]) -> tuple[str, str, list[Cell], str] | Non
     values = [cell for cell in rest if is_number(cell)]
     if split is None or not values or not is_number(rest[0]):
         return None
-    after = rest[len(values)] if len(rest) > len(values) else unit
-    unit = after.strip("[]() ") if isinstance(after, str) else ""
-    return (*split, values, unit if length_name(unit) in LENGTHS else "")
+    more = rest[len(values) :]
+    if more and isinstance(more[0], str) and length_name(more[0].strip("[]() ")) in LENGTHS:
+        unit, more = more[0].strip("[]() "), more[1:]
+    return (*split, values, unit if length_name(unit) in LENGTHS else "", more)
 
 
 def _by_point(file: Path, rows: Sequence[Row]) -> _Parts | None:

@@ -64,7 +64,7 @@ def write_table(
         KincheckError: the file exists, cannot be written, or would be read with other numbers.
     """
     alone = replace(supplied, sheet=None, corner=None)  # the new file has one table
-    tries = [*_texts_with_changes(table, points), _new_text(table, supplied, points)]
+    tries = [*_texts_with_changes(table, points), new_text(table, supplied, points)]
     for content, said in zip(tries, [*[supplied] * (len(tries) - 1), alone], strict=True):
         _write(path, content, option)
         if _reads_back(path, said, supplied, table, points):
@@ -183,7 +183,7 @@ def _change(
     return True
 
 
-def _new_text(
+def new_text(
     table: HardpointTable, supplied: WheelOptions, points: Sequence[Sequence[float]]
 ) -> bytes:
     """Return a new table as CSV, with unit, axes, side and template."""

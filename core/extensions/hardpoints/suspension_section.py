@@ -371,11 +371,11 @@ class SuspensionSection(CaseSection):
         assert issubclass(cls, SuspensionOutput)
         return _of_wheel(name, section, cls, table, case)
 
-    def with_derived(
-        self, outputs: Sequence[Quantity], table: SuspensionTable | None, size: float
-    ) -> Sequence[Quantity]:
-        """Return the outputs with their derivatives by travel, unless the table wants none."""
-        return with_slopes(outputs, size) if table is not None and table.per_travel else outputs
+    def with_derived(self, case: Case, table: SuspensionTable | None) -> Case:
+        """Return the case with derivatives by travel, unless the table wants none."""
+        if table is None or not table.per_travel:
+            return case
+        return replace(case, outputs=with_slopes(case.outputs, size(case)))
 
     def convention(self, section: Section) -> str:
         """Return the convention of signs of the vehicle."""

@@ -1,6 +1,6 @@
 """Hardpoints in a tree of names: YAML or JSON files, and assignments of scripts and lists of
-parameters, `lca_front = [1, 2, 3]`, `UCA_FL.x = 123.4`. Nothing is evaluated: assignments of
-anything but numbers are left out.
+parameters, `lca_front = [1, 2, 3]`, `UCA_FL.x = 123.4`. Assignments of anything but numbers are
+left out.
 
 A point is three numbers, `lca_front: [1, 2, 3]`, or one number for each coordinate: keys x, y and z
 below its name, or names with the coordinate at their end, `lca_front_x`. Its name is its path in
@@ -10,11 +10,10 @@ one suspension are read.
 
 from __future__ import annotations
 
-import ast
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
@@ -58,13 +57,13 @@ _NO_PLACE = re.compile(
     r"axis|(?:.+_)?(?:spin_axis|direction|normal|vector|rotation|orientation|rpy|inertia|euler\w*)"
 )
 _CONTAINERS = ("hardpoints", "hard_points", "hardpoint", "points", "coordinates", "geometry")
-_OF = "axle|suspension|hardpoints|points|geometry|corner|wheel"
+_OF = re.compile(
+    r"(?:_|\b)(?:axle|suspension|susp|hard_?points?|hps?|points?|pts|coord(?:inate)?s|geometry|corner"
+    r"|wheel)(?=_|\b)"
+)
 _LEFT = re.compile(r"(?:.+_)?left|[fr]?l|l[fr]")
 _RIGHT = re.compile(r"(?:.+_)?right|[fr]?r|r[fr]")
-_AXLES = [
-    re.compile(rf"{axle}(?:_(?:left|{_OF}))?|(?:{_OF})_{axle}|{axle[0]}l?|l{axle[0]}")
-    for axle in ("front", "rear")
-]
+_AXLES = [re.compile(rf"{axle}(?:_left)?|{axle[0]}l?|l{axle[0]}") for axle in ("front", "rear")]
 _UNIT_KEYS = ("unit", "units", "length_unit", "length_units", "length")
 _AXES_KEYS = ("axes", "coordinate_system", "frame", "axis_system")
 _TYPE_KEYS = ("type", "template", "suspension_type", "suspension")
@@ -120,81 +119,10 @@ def read_tree(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardpo
         CaseError: no such text, no points, or points of several suspensions.
     """
     if file.suffix.lower() == ".json":
-        return _table(file, "JSON", json_tree(file, without_comments(text)), supplied)
+        return table_of(file, "JSON", json_tree(file, without_comments(text)), supplied)
     if file.suffix.lower() == ".toml":
-        return _table(file, "TOML", toml_tree(file, text), supplied)
-    return _table(file, "YAML", [*_leaves(parse_yaml(file, text))], supplied)
-
-
-def read_python(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
-    """Return the points of the assignments of a Python script, dictionaries among them. Nothing is
-    evaluated; what is no number, text, list or dictionary of these is left out and listed.
-
-    Raises:
-        CaseError: not Python, no points, or points of several suspensions.
-    """
-    left_out = list[str]()
-    leaves = _facts_of_comments(text)
-    try:
-        for each, above in _statements(ast.parse(text).body):
-            targets = each.targets if isinstance(each, ast.Assign) else []
-            if isinstance(each, ast.AnnAssign):
-                targets = [each.target]
-            if not targets:
-                left_out.append(f"line {each.lineno}")
-                continue
-            value = _literal(source) if (source := getattr(each, "value", None)) else ""
-            for target in targets:
-                path = [*above, *_KEY.sub(r".\1", ast.unparse(target)).split(".")]
-                where = f"line {each.lineno} "
-                found = _leaves(value, tuple(path))
-                leaves += [replace(leaf, where=where + leaf.where) for leaf in found]
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        why = brief(f"{type(error).__name__}: {error}".replace("\n", " "))
-        raise fault(file, "", f"is no Python script of points ({why}); correct it") from None
-    return _table(file, "Python", leaves, supplied, left_out)
-
-
-def _statements(body: Iterable[ast.stmt], above: Keys = ()) -> Iterator[tuple[ast.stmt, Keys]]:
-    """Yield the statements of a script, and those of its classes below their names."""
-    for each in body:
-        if isinstance(each, ast.ClassDef):
-            yield from _statements(each.body, (*above, each.name))
-        else:
-            yield each, above
-
-
-def _literal(node: ast.AST) -> Any:
-    """Return the value of an expression of literals, and the text of another one. A call with one
-    list, or with three numbers, is a point: `np.array([1, 2, 3])`, `Vector(1, 2, 3)`.
-    """
-    match node:
-        case ast.Constant(value=int() | float() | str()):
-            return node.value
-        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as number)):
-            return -number
-        case ast.List(elts=items) | ast.Tuple(elts=items):
-            return [_literal(item) for item in items]
-        case ast.Dict():
-            keys = ["**" if key is None else str(_literal(key)) for key in node.keys]
-            return _named_values(zip(keys, map(_literal, node.values), strict=True))
-        case ast.Call(func=ast.Name(id="dict"), args=[]):
-            return _named_values((str(each.arg), _literal(each.value)) for each in node.keywords)
-        case ast.Call(args=[ast.List() | ast.Tuple() as only], keywords=[]):
-            return _literal(only)
-        case ast.Call(args=[_, _, _] as items, keywords=[]):
-            return [_literal(item) for item in items]
-        case _:
-            return ast.unparse(node)
-
-
-def _named_values(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict[str, Any]()
-    for key, value in pairs:
-        if key in found:
-            raise ValueError(f"the key {key!r} stands twice")
-        found[key] = value
-    return found
+        return table_of(file, "TOML", toml_tree(file, text), supplied)
+    return table_of(file, "YAML", [*leaves_of(parse_yaml(file, text))], supplied)
 
 
 def json_tree(file: Path, text: str) -> list[Leaf]:
@@ -204,7 +132,7 @@ def json_tree(file: Path, text: str) -> list[Leaf]:
         CaseError: not JSON.
     """
     listed = text.lstrip().startswith("[")
-    return [*_leaves(parse(file, f'{{"points": {text}}}' if listed else text))]
+    return [*leaves_of(parse(file, f'{{"points": {text}}}' if listed else text))]
 
 
 def toml_tree(file: Path, text: str) -> list[Leaf]:
@@ -213,7 +141,7 @@ def toml_tree(file: Path, text: str) -> list[Leaf]:
     Raises:
         CaseError: not TOML.
     """
-    return [*_leaves(parse(file, text)), *_facts_of_comments(text)]
+    return [*leaves_of(parse(file, text)), *fact_leaves(facts_of_comments(file, text))]
 
 
 def has_points(tree: Sequence[Leaf]) -> bool:
@@ -233,13 +161,34 @@ def axis_of(name: str) -> tuple[str, str] | None:
     return parts["name"].strip(), (parts["axis"] or parts["bare"]).lower()
 
 
-def _facts_of_comments(text: str) -> list[Leaf]:
-    comments = (line.strip() for line in text.splitlines() if line.lstrip().startswith("#"))
-    return _fact_leaves(fact for comment in comments if (fact := fact_of(comment)))
+def add_fact(file: Path, where: str, facts: dict[str, str], fact: tuple[str, str]) -> None:
+    """Add a fact to those above.
+
+    Raises:
+        CaseError: another one stands there.
+    """
+    name, value = fact
+    if facts.setdefault(name, value).lower() != value.lower():
+        problem = f"found {name} {shown(value)}, and {shown(facts[name])} above, expected one"
+        raise fault(file, where, f"{problem}; remove either")
 
 
-def _fact_leaves(facts: Iterable[tuple[str, str]]) -> list[Leaf]:
-    return [Leaf((key,), value, key) for key, value in facts]
+def facts_of_comments(file: Path, text: str) -> dict[str, str]:
+    """Return the facts in whole lines of comments.
+
+    Raises:
+        CaseError: two contradict each other.
+    """
+    facts = dict[str, str]()
+    for k, line in enumerate(text.splitlines(), 1):
+        if line.lstrip().startswith("#") and (fact := fact_of(line.strip())):
+            add_fact(file, f"line {k}", facts, fact)
+    return facts
+
+
+def fact_leaves(facts: Mapping[str, str]) -> list[Leaf]:
+    """Return facts as values of a tree."""
+    return [Leaf((key,), value, key) for key, value in facts.items()]
 
 
 def is_assignments(lines: Sequence[tuple[str, str]]) -> bool:
@@ -269,7 +218,7 @@ def read_assignments(
         assigned = _ASSIGNED.fullmatch(line)
         if assigned is None:
             if fact := fact_of(line):
-                facts.setdefault(*fact)
+                add_fact(file, where, facts, fact)
             elif line.strip():
                 left_out.append(where)
             continue
@@ -291,19 +240,32 @@ def read_assignments(
         if (isinstance(value, list) or leaf.coordinate) and length_name(unit) in LENGTHS:
             units.setdefault(length_name(unit), where)
         found.append(leaf)
-    if unit := one_unit(file, units):
-        if length_name(facts.get("unit", unit)) != unit:
-            problem = f"found {unit}, and {facts['unit']} in a comment, expected one unit"
-            raise fault(file, units[unit], f"{problem}; correct either")
-        facts.setdefault("unit", unit)
-    return _table(file, "Assigned", [*found, *_fact_leaves(facts.items())], supplied, left_out)
+    told = with_unit(file, facts, units)
+    return table_of(file, "Assigned", [*found, *fact_leaves(told)], supplied, left_out)
 
 
-def _leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
+def with_unit(file: Path, facts: Mapping[str, str], units: Mapping[str, str]) -> dict[str, str]:
+    """Return the facts of a file, the unit of its points among them.
+
+    Args:
+        units: places of points by the unit beside them.
+
+    Raises:
+        CaseError: there are several units.
+    """
+    unit = one_unit(file, units)
+    stated = facts.get("unit", unit)
+    if unit and length_name(stated) != unit:
+        problem = f"found {unit}, and {stated} in a comment, expected one unit"
+        raise fault(file, units[unit], f"{problem}; correct either")
+    return {"unit": stated, **facts} if unit else dict(facts)
+
+
+def leaves_of(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
     """Yield the values of a tree; a list of numbers or texts is one value."""
     if isinstance(value, Mapping):
         for key, each in cast("Mapping[str, Any]", value).items():
-            yield from _leaves(each, (*keys, str(key)))
+            yield from leaves_of(each, (*keys, str(key)))
         return
     items = cast("list[Any]", value) if isinstance(value, list) else []
     if isinstance(value, list) and (
@@ -311,7 +273,7 @@ def _leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
     ):
         for k, each in enumerate(items):
             name, unnamed = _split_name(each)
-            yield from _leaves(unnamed, (*keys, name or f"[{k}]"))
+            yield from leaves_of(unnamed, (*keys, name or f"[{k}]"))
     else:
         yield Leaf(keys, value, ".".join(keys))
 
@@ -326,17 +288,27 @@ def _split_name(item: Any) -> tuple[str, Any]:
     cells = cast("list[Any]", item) if isinstance(item, list) else []
     if len(cells) == 4 and isinstance(cells[0], str) and not is_number(cells[0]):
         return cells[0], cells[1:]
+    if len(cells) == 2 and isinstance(cells[0], str) and isinstance(cells[1], list | dict):
+        return cells[0], cast("Any", cells[1])
     return "", cast("Any", item)
 
 
-def _table(
+def table_of(
     file: Path,
     tool: str,
     tree: Sequence[Leaf],
     supplied: WheelOptions,
     left_out: Sequence[str] = (),
 ) -> HardpointTable:
-    """Return the points of a tree."""
+    """Return the points of a tree.
+
+    Args:
+        tool: program of the format.
+        left_out: other content of the file.
+
+    Raises:
+        CaseError: no points, or points of several suspensions.
+    """
     points, others = _points(file, tree)
     facts = _facts(others)
     if not points:
@@ -448,10 +420,11 @@ def _of_one_suspension(
         for k in [k for k, key in enumerate(keys[:-1]) if normal(key) in _CONTAINERS][:1]
     }
     if contained:
-        outside = [".".join(keys) for keys in paths if keys not in contained]
+        beside = {keys: keys for keys in paths if len(keys) == 1 and compact(keys[0]) in ROLES}
+        outside = [".".join(keys) for keys in paths if keys not in {**contained, **beside}]
         if outside:
             left_out.append(f"values {shortened(outside, 8)}")
-        kept = contained
+        kept = beside | contained
     if wanted is not None:
         inside = {keys: _below(short, wanted) for keys, short in kept.items()}
         found = {keys: short for keys, short in inside.items() if short}
@@ -467,15 +440,19 @@ def _of_one_suspension(
             left_out.append(f"{rest} points of other sections")
         kept = found
     corner = None
-    named = {keys: [k for k in short[:-1] if corner_of(k)] for keys, short in kept.items()}
+    named = {
+        keys: [k for k in short[:-1] if corner_of(_section(k))] for keys, short in kept.items()
+    }
     if supplied.corner is not None and any(named.values()):
         corner = wanted_corner(file, supplied.corner)
         short = {
             keys: tuple(
-                key for k, key in enumerate(short) if k + 1 == len(short) or not corner_of(key)
+                key
+                for k, key in enumerate(short, 1)
+                if k == len(short) or not corner_of(_section(key))
             )
             for keys, short in kept.items()
-            if all(agree(corner_of(key) or ("", ""), corner) for key in named[keys])
+            if all(agree(corner_of(_section(key)) or ("", ""), corner) for key in named[keys])
         }
         if not any(named[keys] for keys in short):
             known = dict.fromkeys(key for keys in named.values() for key in keys)
@@ -487,13 +464,9 @@ def _of_one_suspension(
     if right and _LEFT in sides.values():
         left_out.append(f"{len(right)} points of the right side")
         kept = {keys: short for keys, short in kept.items() if keys not in right}
-    first, *others = kept.values()
-    most = min(map(len, kept.values())) - 1
-    differ = (k for k in range(most) if any(keys[k] != first[k] for keys in others))
-    shared = next(differ, max(most, 0))
-    kept = {keys: short[shared:] for keys, short in kept.items()}
+    kept = _without_shared(kept)
     sections = dict.fromkeys(short[0] for short in kept.values() if len(short) > 1)
-    if all(any(axle.fullmatch(normal(each)) for each in sections) for axle in _AXLES):
+    if all(any(axle.fullmatch(_section(each)) for each in sections) for axle in _AXLES):
         raise fault(
             file,
             "",
@@ -502,11 +475,38 @@ def _of_one_suspension(
         )
     names = {
         keys: ".".join(
-            each for k, each in enumerate(short, 1) if k == len(short) or normal(each) != "left"
+            each for k, each in enumerate(short, 1) if k == len(short) or _section(each) != "left"
         )
         for keys, short in kept.items()
     }
     return names, left_out, corner
+
+
+def _without_shared(kept: Mapping[Keys, Keys]) -> dict[Keys, Keys]:
+    """Return the keys of points without the sections shared by all. Points beside the only section
+    are of its suspension, if the names in it are those of a suspension.
+    """
+    inside = [short for short in kept.values() if len(short) > 1]
+    most = min(map(len, inside), default=1) - 1
+    shared = next((k for k in range(most) if len({short[k] for short in inside}) > 1), most)
+    bare = {keys: short[shared:] if len(short) > 1 else short for keys, short in kept.items()}
+    if len(inside) == len(kept) or _roles(bare) > _roles(kept):
+        return bare
+    axle = shared and any(axle.fullmatch(_section(inside[0][shared - 1])) for axle in _AXLES)
+    return bare if axle and _roles(bare) == _roles(kept) else dict(kept)
+
+
+def _roles(kept: Mapping[Keys, Keys]) -> int:
+    """Return how many points have the name of a role of a template, each counted once."""
+    return len({compact(".".join(short)) for short in kept.values()} & ROLES)
+
+
+def _section(key: str) -> str:
+    """Return the normal name of a section without words such as hardpoints: `HP_FRONT` and
+    `frontHardpoints` are front.
+    """
+    plain = normal(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", key))
+    return _OF.sub("", plain).strip("_") or plain
 
 
 def _below(keys: Keys, wanted: str) -> Keys:
@@ -515,12 +515,14 @@ def _below(keys: Keys, wanted: str) -> Keys:
         for last in range(first + 1, len(keys)):
             if normal(".".join(keys[first:last])) == normal(wanted):
                 return keys[last:]
+        if _section(keys[first]) == normal(wanted):
+            return keys[first + 1 :]
     return ()
 
 
 def _side(keys: Keys) -> re.Pattern[str] | None:
     """Return the pattern of the side that a key above the point's names; None without one."""
-    sides = (side for key in keys[:-1] for side in (_LEFT, _RIGHT) if side.fullmatch(normal(key)))
+    sides = (side for key in keys[:-1] for side in (_LEFT, _RIGHT) if side.fullmatch(_section(key)))
     return next(sides, None)
 
 

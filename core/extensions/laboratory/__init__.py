@@ -4,8 +4,13 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["proofs", "sweep", "compliance"],
+    needs=["proofs", "sweep", "compliance", "statics"],
     commands={"bench": "command:BenchAll", "stress": "command:StressEngines"},
     sources={"bench": "source:BenchOfRun"},
+    styles={
+        "paper": "paper.rows:paper",
+        "conventional": "paper.rows:conventional",
+        "relative": "paper.relative:relative",
+    },
     completions={"family": "stress.families:FAMILIES"},
 )

@@ -9,12 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...case.io.atomic_files import require_writable, written
 from ...case.io.reader_options import CurveOptions, Supplied
 from ...cli.parser import Command
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import TOL, with_references
-from ...errors import KincheckError
-from ...options import argument, group, joint_types, option, options, switch, whole
+from ...errors import KincheckError, refuse
+from ...options import argument, destination, group, joint_types, option, options, switch, whole
 from ...report.progress import complain
 
 if TYPE_CHECKING:
@@ -47,6 +48,12 @@ class Serve(Command):
     )
     no_browser: bool = switch("print the address, and open no browser", init=False)
     once: bool = switch("end when the page is closed, with status 0", init=False)
+    save: Path | None = destination(
+        "write the page of a table to this file instead, with its solver in it: it opens without"
+        " server and Python, and has no engines to check by",
+        Path,
+        init=False,
+    )
     measure: int | None = option(
         "make N edits of a table, print how long each step takes, in the browser too unless"
         " --no-browser, and end",
@@ -86,7 +93,7 @@ class Serve(Command):
         """Do the work of the command line."""
         if not self.reference and self.curve.without_curve:
             raise KincheckError(self.curve.without_curve)
-        naming = None if self.measure else self._naming(registry)
+        naming = None if self.measure or self.save else self._naming(registry)
         if naming is None:
             return self._serve(registry, self.supplied)
         try:
@@ -122,6 +129,8 @@ class Serve(Command):
             tell: takes another page to the address.
         """
         wanted, read = self.measure or 0, self._reader(registry, supplied)
+        if self.save:
+            return self._write_page(read())
         if wanted:
             _measure_edits(read(), wanted)
             if self.no_browser:
@@ -143,6 +152,25 @@ class Serve(Command):
             server.close()
         if wanted:
             _print_times("browser", server.measured)
+        return Status.WITHIN
+
+    def _write_page(self, live: Live) -> int:
+        from .saved import saved_page
+        from .table import LiveTable
+
+        served = {"--port": self.port, "--once": self.once, "--measure": self.measure}
+        for name, given in (served | {"--vary": self.variation}).items():
+            if given:
+                raise KincheckError(f"{name}: a saved page has no server. Leave it out, or --save.")
+        if not isinstance(live, LiveTable):
+            raise KincheckError(
+                f"--save: {live.file} is no table of hardpoints, and only their pages have a solver"
+                " of their own. Give a table, or leave --save out."
+            )
+        assert self.save
+        require_writable([("--save", self.save)])
+        refuse(written(self.save, saved_page(live).encode()))
+        print(self.save)
         return Status.WITHIN
 
     def _server(self, registry: Registry, read: Callable[[], Live], **how: Any) -> LiveServer:

@@ -1,19 +1,23 @@
 "use strict";
-// The link to the server: questions of which one is on its way, and the newest waits.
+// The link to who answers: questions of which one is on its way, and the newest waits.
 
-// Connect, and call `on[type]` for each message, `on.lost` at the end.
+// Connect by `answererOf` (of a server, or of the solver in a saved page), and call `on[type]` for
+// each message, `on.lost` at the end.
 // Returns `ask`, which sends a message under a kind: while an answer to the kind is due, only the
 // newest message of it waits; and `tell`, which sends at once.
 function linkTo(on) {
-  const token = new URLSearchParams(location.search).get("token") || "";
-  const socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(token)}`);
   const due = new Map(); // kind: number of the message on its way
   const next = new Map(); // kind: message that waits
   let count = 0;
+  const hear = (message) => {
+    settle(message.id);
+    on[message.type](message);
+  };
+  const send = answererOf(hear, () => on.lost());
 
   function tell(message) {
     count += 1;
-    socket.send(JSON.stringify({ ...message, id: count }));
+    send({ ...message, id: count });
     return count;
   }
   function ask(kind, message) {
@@ -29,11 +33,5 @@ function linkTo(on) {
       if (message) ask(kind, message);
     }
   }
-  socket.addEventListener("message", ({ data }) => {
-    const message = JSON.parse(data);
-    settle(message.id);
-    on[message.type](message);
-  });
-  socket.addEventListener("close", () => on.lost());
   return { ask, tell, isDue: (kind) => due.has(kind) };
 }

@@ -1,5 +1,5 @@
 "use strict";
-// The live page: the page owns the design, and the server answers for numbers.
+// The live page: the page owns the design, and a server, or its own solver, answers for numbers.
 
 const METRES = { mm: 0.001, cm: 0.01, m: 1, inch: 0.0254, in: 0.0254, foot: 0.3048, ft: 0.3048 };
 const DIRECTIONS = {
@@ -66,6 +66,9 @@ function remembered(key, text) {
     for (const each of document.querySelectorAll("[data-kind]")) {
       each.hidden = each.dataset.kind !== message.kind;
     }
+    const isAlone = !message.engines.length; // a saved page
+    for (const each of document.querySelectorAll("[data-engines]")) each.hidden = isAlone;
+    one("#alone").hidden = !isAlone;
     const groups = [...new Set(message.outputs.map(({ group }) => group))];
     one("#group").replaceChildren(...groups.map((name) => new Option(name, name)));
     one("#engines").replaceChildren(...message.engines.map(engineBox));
@@ -284,8 +287,8 @@ function remembered(key, text) {
       state.latest += 1;
       const whole = performance.now() - state.asked;
       state.times.push(whole);
-      const server = Object.values(steps).reduce((total, each) => total + each, 0);
-      const text = `server ${server.toFixed(0)} ms, edit to screen ${whole.toFixed(0)} ms`;
+      const answer = Object.values(steps).reduce((total, each) => total + each, 0);
+      const text = `answer ${answer.toFixed(0)} ms, edit to screen ${whole.toFixed(0)} ms`;
       one("#cost").textContent = text;
     });
   }

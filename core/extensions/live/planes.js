@@ -3,6 +3,7 @@
 
 const LATE = 60; // time for an answer, before the points are drawn without it [ms]
 const NEAR = 14; // from a pointer to the point that it takes [px]
+const NEAR_FINGER = 28;
 const PLANE_VIEWS = [
   ["y z", "front"],
   ["x z", "side"],
@@ -77,8 +78,15 @@ function planes(box, points, { metres, file, step }, design, choose) {
         return { k, far: Math.round(Math.hypot(px - x, py - y)), depth };
       });
       found.sort((a, b) => a.far - b.far || b.depth - a.depth);
-      return found.length && found[0].far <= NEAR ? found[0].k : -1;
+      const most = event.pointerType === "mouse" ? NEAR : NEAR_FINGER;
+      return found.length && found[0].far <= most ? found[0].k : -1;
     }
+    // A finger beside the points scrolls the page.
+    canvas.addEventListener(
+      "touchstart",
+      (event) => nearest(event.touches[0]) >= 0 && event.preventDefault(),
+      { passive: false },
+    );
     canvas.addEventListener("pointerdown", (event) => {
       const k = nearest(event);
       choose(k);

@@ -61,6 +61,7 @@ from .protocol import (
 )
 from .table import LiveTable
 
+HERE = Path(__file__).parent
 HOST = "127.0.0.1"
 LOCAL = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?", re.IGNORECASE)
 """Names of this machine; any port, for tunnels such as ssh -L."""
@@ -437,12 +438,15 @@ def _parts(request: Any) -> tuple[str, str]:
 @cache
 def page_files() -> dict[str, tuple[str, str]]:
     """Return the files of the page by path: content and media type."""
-    own = Path(__file__).parent
-    scripts = [script_of(name) for name in SCENE_SCRIPTS]
-    scripts += [script_of(name, own) for name in LIVE_SCRIPTS]
-    style = style_sheet() + (own / "live.css").read_text("utf-8")
+    style = style_sheet() + (HERE / "live.css").read_text("utf-8")
     return {
-        "/": ((own / "live.html").read_text("utf-8"), "text/html"),
-        "/live.js": ("\n".join(scripts), "text/javascript"),
+        "/": ((HERE / "live.html").read_text("utf-8"), "text/html"),
+        "/live.js": (page_script("socket.js"), "text/javascript"),
         "/live.css": (style, "text/css"),
     }
+
+
+def page_script(answerer: str) -> str:
+    """Return the script of the page, with that of the one who answers it."""
+    own = [script_of(name, HERE) for name in (answerer, *LIVE_SCRIPTS)]
+    return "\n".join([*map(script_of, SCENE_SCRIPTS), *own])

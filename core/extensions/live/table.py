@@ -81,7 +81,7 @@ class LiveFile:
             kind=self.kind,
             file=self.file.name,
             source=self.case.source,
-            outputs=[*map(_live_output, self.case.outputs)],
+            outputs=live_outputs(self.case),
             axis=LiveAxis(self.axis.label, self.axis.values, self.axis.scale, self.axis.up),
             engines=[*engines],
             reference=_live_reference(self.case),
@@ -171,7 +171,7 @@ class LiveTable(LiveFile):
         times = [perf_counter()]
         case = self.edited_case(asked.points)
         times.append(perf_counter())
-        found = self._current(case).solve(_geometry(case), alone=asked.whole)
+        found = self._current(case).solve(geometry_of(case), alone=asked.whole)
         times.append(perf_counter())
         values = {
             each.name: found.values(each.name)[:, 0].tolist()
@@ -220,7 +220,7 @@ class LiveTable(LiveFile):
             ]
         )
         ready = self._ready_for(case, asked.output)
-        found = ready.solve(_geometry(case), alone=False)
+        found = ready.solve(geometry_of(case), alone=False)
         ((_, by_number),) = found.slopes(towards)
         samples = key_samples(self.case, found.solved)
         slopes = by_number[:, samples, 0].T
@@ -243,7 +243,7 @@ class LiveTable(LiveFile):
         variation = read_variation(self.vary_file, case)
         count = min(variation.count or VARIANTS, VARIANTS)
         varied = variation.geometry(variation.offsets(0, 0, count))
-        geometry = _geometry(case, _by_place(variation.places, varied))
+        geometry = geometry_of(case, _by_place(variation.places, varied))
         self._require_motion(case, asked.output)
         found = self._current(case).solve(geometry, alone=False)
         values, samples = found.values(asked.output), key_samples(case, found.solved)
@@ -275,13 +275,13 @@ class LiveTable(LiveFile):
         with at_once:  # otherwise an edit in between waits for the compiler
             bodies = [body.name for body in case.mechanism.moving]
             ready = DesignOutputs.of(without_forces(case), places(case.mechanism), bodies=bodies)
-            ready.solve(_geometry(case))
-        self._structure, self._differentiated = _structure(case), dict[str, DesignOutputs]()
+            ready.solve(geometry_of(case))
+        self._structure, self._differentiated = structure_of(case), dict[str, DesignOutputs]()
         return ready
 
     def _current(self, case: Case) -> DesignOutputs:
         """Return the program of a case: the same for all numbers, unless they change the joints."""
-        if self._structure != _structure(case):
+        if self._structure != structure_of(case):
             self._ready = self._prepare(case)
         return self._ready
 
@@ -356,6 +356,11 @@ def key_samples(case: Case, solved: NDArray[np.bool_]) -> list[int]:
     return [known[0], int(np.abs(case.sweep.change).argmin()), known[-1]]
 
 
+def live_outputs(case: Case) -> list[LiveOutput]:
+    """Return the outputs of a case for the page."""
+    return [*map(_live_output, case.outputs)]
+
+
 def _live_output(output: Quantity) -> LiveOutput:
     """Return an output for the page, in display units."""
     shown, scale = DISPLAY.get(output.unit, (output.unit, 1.0))
@@ -389,7 +394,7 @@ def _by_place(sizes: Mapping[str, int], geometry: Array) -> dict[str, Array]:
     return dict(zip(sizes, np.split(geometry, np.cumsum([*sizes.values()])[:-1]), strict=True))
 
 
-def _geometry(case: Case, moved: Mapping[str, Array] = MappingProxyType({})) -> Array:
+def geometry_of(case: Case, moved: Mapping[str, Array] = MappingProxyType({})) -> Array:
     """Return the numbers of all places of V variants, shape (numbers, V).
 
     Args:
@@ -404,7 +409,7 @@ def _geometry(case: Case, moved: Mapping[str, Array] = MappingProxyType({})) -> 
     )
 
 
-def _structure(case: Case) -> list[Any]:
+def structure_of(case: Case) -> list[Any]:
     """Return the key of a program: all but the numbers of places, and tolerances."""
     joints = [f"{each.name} {each.type} {each.bodies}" for each in case.mechanism.joints]
     points = [f"{each.name} {each.body}" for each in case.mechanism.points]

@@ -22,7 +22,6 @@ from ...kinematics.forces.reactions import Follow, ForceRows, with_forces
 from ...kinematics.forces.wanted import WantedForces, wanted_forces
 from ...kinematics.formulation.cartesian import Cartesian
 from ...kinematics.formulation.constraints import frames
-from ...kinematics.formulation.relative import row_names
 from ...kinematics.formulation.state_vectors import displaced, state_of
 from ...kinematics.structure.degrees_of_freedom import select_rows
 from ...mechanism.loads import TorsionSpringDamper
@@ -169,7 +168,7 @@ def prove(
     samples: list[Enclosure | UnprovedError] = []
     seconds: list[float] = []
     others: dict[int, Sequence[str]] = {}
-    names = row_names(Cartesian.of(mechanism, model.frame))
+    names = Cartesian.of(mechanism, model.frame).row_names
     with precision(bits):
         exact, kept = exact_mechanism(mechanism, reading), model.selection.chosen
         traced = {kept: equations(exact, tuple(drives), points, kept, wanted)}

@@ -109,6 +109,10 @@ _ADAMS = {
     "alpha": ("WDX", "WDY", "WDZ"),
 }
 """Components of the pose of a part in results of Adams; its angles are about axes of the body."""
+_PLANAR = {"position": "attitude", "velocity": "omega", "acceleration": "alpha"}
+"""What the third column of a planar pose and its rates is: about z."""
+# The last word in the name of a third component along z: z and vz, not wz.
+_UPWARDS = re.compile(r"(?!w|om|al).*z")
 _NEEDS = (
     *(("velocity", "omega"), ("omega", "velocity"), ("acceleration", "velocity")),
     *(("acceleration", "alpha"), ("alpha", "acceleration")),
@@ -122,7 +126,7 @@ _QUATERNIONS = {"wxyz": ("e0", "e1", "e2", "e3"), "xyzw": ("qx", "qy", "qz", "qw
 FORM = (
     'say --map "NAME=COLUMN", "NAME=-COLUMN+12 [mm]", or of a body --map "BODY=PREFIX: x y z, euler'
     ' 321 a b c [deg]", "BODY=PREFIX: x y z, quaternion xyzw qx qy qz qw" or, planar,'
-    ' "BODY=PREFIX: x y angle"'
+    ' "BODY=PREFIX: x y angle, velocity vx vy w"'
 )
 
 ACCURACY = "--accuracy"
@@ -153,8 +157,8 @@ class Pose:
     """The columns of the pose of a body, and their meaning.
 
     Attributes:
-        groups: columns by position, attitude, velocity, omega, acceleration and alpha; of a planar
-            pose x and y, or one about z.
+        groups: columns by position, attitude, velocity, omega, acceleration and alpha; in the plane
+            x and y, or one about z.
         turned: omega and alpha, if along the axes of the recorded frame.
         frame: origin and Euler parameters of the recorded frame at design, global; empty for the
             body's own frame, None for the frame whose first sample is the design pose.
@@ -332,28 +336,31 @@ class Reader:
             if key == "frame":
                 frame = self._frame(names)
                 continue
-            what, si, count = key, _UNITS.get(key, "m"), 3
+            what, si, counts = key, _UNITS.get(key, "m"), [3]
             if key in ("euler", "quaternion"):
                 reading, names = self._reading(key, names)
-                what, si, count = "attitude", *(("rad", 3) if reading.angles else ("1", 4))
+                what, si, counts = "attitude", *(("rad", [3]) if reading.angles else ("1", [4]))
             elif key in _OF_MOTION:
                 turned += [key] * ("body" in names)
-                names = [name for name in names if name != "body"]
+                names, counts = [name for name in names if name != "body"], [1, 2, 3]
             elif key != "position":
                 what, names = "position", [key, *names]
-            if len(names) != count or what in groups:
-                problem = f"found {shown(part.strip())}, expected {count} columns of {what}, once"
-                raise self._fault(f"{problem}; {FORM}")
+            if len(names) not in counts or what in groups:
+                problem = f"found {shown(part.strip())}, expected {counts[-1]} columns of {what}"
+                raise self._fault(f"{problem}, once; {FORM}")
             named = (self._column(name, prefix.strip() if colon else "") for name in names)
             groups[what] = tuple(Use(k, si, unit) for k in named)
-        if "attitude" not in groups and self._is_planar(groups.get("position", ())):
-            *place, angle = groups["position"]
-            turns = angle.unit in ANGLES
-            groups["position"] = tuple(
-                replace(use, unit="" if turns else use.unit) for use in place
-            )
-            groups["attitude"] = (replace(angle, si="rad", unit=angle.unit if turns else ""),)
+        planar = "attitude" not in groups and self._is_planar(groups.get("position", ()))
+        if planar:
             reading = Reading(PLANE)
+            for place, turn in _PLANAR.items():
+                if turn not in groups and self._is_planar(groups.get(place, ())):
+                    groups |= _split(groups, place, turn)
+        for what, uses in groups.items():
+            counts = [1, 3] if planar and what in _PLANAR.values() else [2, 3] if planar else [3]
+            if what in _OF_MOTION and len(uses) not in counts:
+                problem = f"found {len(uses)} columns of {what}, expected {counts[0]}"
+                raise self._fault(f"{problem} of {'a planar' if planar else 'this'} pose; {FORM}")
         lacking = [each for each in ("position", "attitude") if each not in groups]
         lacking += [b for a, b in _NEEDS if a in groups and b not in groups]
         if lacking:
@@ -362,13 +369,15 @@ class Reader:
         return Pose(groups, reading, tuple(turned), frame)
 
     def _is_planar(self, position: Sequence[Use]) -> bool:
-        """Return whether the third of three columns is an angle, by its unit or else its name."""
+        """Return whether the third of three columns is an angle or its rate, by its unit or else
+        its name.
+        """
         if len(position) < 3:
             return False
         head, stated = self.heads[position[2].column], position[2].unit
-        if unit := head.unit or (stated if stated in ANGLES else ""):
-            return UNIT_NAMES.get(unit.lower(), unit.lower()) in (*ANGLES, "mrad")
-        return not head.name.lower().endswith("z")
+        if unit := head.unit or (stated if _turns(stated) else ""):
+            return _turns(unit)
+        return not _UPWARDS.fullmatch(re.split(r"[._ ]", head.name.lower())[-1])
 
     def _reading(self, key: str, words: Sequence[str]) -> tuple[Reading, list[str]]:
         """Return the reading of words, and the words after it."""
@@ -416,6 +425,24 @@ class Reader:
                     uses = [Use(places[n], si) for n, si in zip(names, "mmm1111", strict=True)]
                     groups = {"position": (*uses[:3],), "attitude": (*uses[3:],)}
                     yield name, Pose(groups, Reading(order))
+
+
+def _turns(unit: str) -> bool:
+    """Return whether a unit is one of angles, or of their rates."""
+    whole = unit.lower().partition("/")[0]
+    return UNIT_NAMES.get(whole, whole) in (*ANGLES, "mrad")
+
+
+def _split(
+    groups: Mapping[str, tuple[Use, ...]], place: str, turn: str
+) -> dict[str, tuple[Use, ...]]:
+    """Return two columns of a place or its rate in the plane, and the third, of the angle."""
+    *along, angle = groups[place]
+    turns = _turns(angle.unit)
+    return {
+        place: tuple(replace(use, unit="" if turns else use.unit) for use in along),
+        turn: (replace(angle, si=_UNITS[turn], unit=angle.unit if turns else ""),),
+    }
 
 
 def _normal(name: str) -> str:

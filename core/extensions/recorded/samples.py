@@ -246,6 +246,13 @@ def motion_of(
     rates: list[Array | None] = [None, None]
     if "velocity" in given:
         none = np.zeros((3, len(r)))
+        # of a planar pose: along x and y, about z
+        given = {
+            what: [*values, *none[: 3 - len(values)]]
+            if what in ("velocity", "acceleration")
+            else [*none[: 3 - len(values)], *values]
+            for what, values in given.items()
+        }
         w, w_t = (
             frame.turn(vec([*given.get(what, none)]))
             if what in pose.turned

@@ -235,6 +235,21 @@ def _ready(
             raise CaseError(f"curves: {name!r} is a force, which has no slopes; leave it out there")
     chosen = [known[name] for name in dict.fromkeys((*wanted, *slopes))]
     case = replace(case, outputs=tuple(chosen))
+    varied, nominal, moves, units = moved_by(case, names)
+    designs = DesignOutputs.of(case, varied, slopes=slopes)
+    return ReadyCurves(designs, nominal, moves, units, slopes)
+
+
+def moved_by(
+    case: Case, names: Sequence[str]
+) -> tuple[Sequence[str], Array, Array, Mapping[str, str]]:
+    """Return the places that follow numbers of the geometry, their own numbers at design, shape
+    (numbers,), the derivatives of these, shape (numbers, names), and the units of the named ones.
+
+    Raises:
+        CaseError: there is no such place, or the case drives the absolute position of a point that
+            varies.
+    """
     if not names:
         raise CaseError("curves: places names nothing to vary, expected 'lca_front z' or the like")
     geometry = Geometry(case)
@@ -253,13 +268,8 @@ def _ready(
     matrix = [np.concatenate([*(still | moved).values()]) for moved in moves]
     nominal = [x for place in varied for x in geometry.values[place]]
     units = {name: unit for name, (_, unit) in zip(names, found, strict=True)}
-    return ReadyCurves(
-        DesignOutputs.of(case, varied, slopes=slopes),
-        np.array(nominal, dtype=float),
-        np.array(matrix).reshape(len(names), len(nominal)).T,
-        units,
-        slopes,
-    )
+    numbers = np.array(matrix).reshape(len(names), len(nominal)).T
+    return [*varied], np.array(nominal, dtype=float), numbers, units
 
 
 def _number(geometry: Geometry, name: str) -> tuple[dict[str, Array], str]:

@@ -15,8 +15,8 @@ from ...case.units import ANGLES, LENGTHS, in_units
 from ...dataset import Dataset, Variable
 from ...errors import number_of
 from ...harness.compare import numbers
+from ...harness.labels import driver_unit
 from ...harness.record import Outcome
-from ...report.axis import DRIVER_UNITS
 from ...tabular import Tabular
 from ...trajectory import Array
 from .conformance import Capability, Histogram
@@ -183,7 +183,7 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
     def shown_driver(self) -> tuple[str, float]:
         """The unit of tables and figures for the swept driver, and the factor to it."""
         case = self.run["cases"].get(self.case, {})
-        return self.shown_unit(DRIVER_UNITS.get(case.get("driver", {}).get("type", ""), ""))
+        return self.shown_unit(driver_unit(case))
 
     def unit_of(self, coordinate: str) -> str:
         """Return the SI unit of a varied coordinate."""

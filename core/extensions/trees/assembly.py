@@ -286,28 +286,31 @@ class Closing:
 
     @property
     def limit(self) -> float:
-        """Largest gap of an assembly [m or rad]."""
-        return max(ADDED_UP * self.tolerance, CLOSED * self.size)
+        """Largest gap of an assembly [m]."""
+        return max(self.tolerance, CLOSED * self.size)
 
     def gaps(self, pose: Pose) -> list[tuple[float, Tie]]:
-        """Return the ties with their residuals [m or rad], the largest first."""
-        found = [(float(np.abs(_residual(each, pose)).max()), each) for each in self.ties]
-        return sorted(found, key=lambda each: -each[0])
+        """Return the ties with their residuals [m], angles at arms of the size; of couplings [m or
+        rad]. The largest come first.
+        """
+
+        def gap(tie: Tie) -> float:
+            residual = np.abs(_residual(tie, pose))
+            arms = 1.0 if isinstance(tie, Coupling) else self.size
+            return float(max([*residual[:3], *(arms * residual[3:])]))
+
+        return sorted(((gap(each), each) for each in self.ties), key=lambda each: -each[0])
 
     def gap(self, pose: Pose) -> float:
-        """Return the largest residual [m or rad]."""
+        """Return the largest residual of `gaps`."""
         return self.gaps(pose)[0][0] if self.ties else 0.0
 
     def closure_gap(self, pose: Pose) -> float:
-        """Return the largest gap of closures [m], angles at arms of the size; offsets of coupled
-        coordinates are meant, and do not count.
+        """Return the largest gap of closures [m]; offsets of coupled coordinates are meant, and do
+        not count.
         """
-        found = 0.0
-        for each in self.ties:
-            if isinstance(each, Closure):
-                residual = np.abs(_residual(each, pose))
-                found = max(found, *residual[:3], *(self.size * residual[3:]))
-        return found
+        every = (gap for gap, tie in self.gaps(pose) if isinstance(tie, Closure))
+        return max(every, default=0.0)
 
     def rows(self, pose: Pose) -> tuple[Array, Array]:
         """Return residuals and their derivatives, lengths over the size: (rows,), (rows, n)."""
@@ -503,7 +506,7 @@ def _nearest_closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[
         for name in given:
             moving[[*start.columns[name]]] = 0.0
         found = _descend(closing, start, moving)
-        if closing.gap(found) <= max(closing.tolerance, CLOSED * closing.size):
+        if closing.gap(found) <= closing.limit:
             break
     return found
 
@@ -540,7 +543,7 @@ def _open_error(
     texts = [f"{tie.name} by {gap:.2g}" for gap, tie in left if gap > closing.limit]
     gap, widest = left[0]
     return widest.element.fault(
-        f"is open: the start ({start.text}) by {opened:.4g} m or rad, and the nearest pose that was"
+        f"is open: the start ({start.text}) by {opened:.4g} m, and the nearest pose that was"
         f" found by {gap:.4g}, expected {closing.tolerance:.3g} m at most ({closing.why}); still"
         f" open are {shortened(texts, MOST_SHOWN)}; give a start that can be closed by --start,"
         " another tolerance by --closure, or correct the model",

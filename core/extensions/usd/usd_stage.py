@@ -181,7 +181,9 @@ class _Prims:
             yield element
 
     def _properties(self, element: Element, prim: Any) -> Iterator[tuple[str, str]]:
-        """Yield names and texts of properties; of relationships the paths of their targets."""
+        """Yield names and texts of properties; of relationships the paths of their targets, of
+        arrays, matrices and other kinds that nothing here is written in, the kind.
+        """
         for each in prim.GetAuthoredProperties():
             name = str(each.GetName())
             if name.partition(":")[0] in _LEFT_OUT:
@@ -191,6 +193,7 @@ class _Prims:
                 continue
             kind = str(each.GetTypeName())
             if kind not in _SCALARS and not _VECTORS.fullmatch(kind):
+                yield name, f"({kind})"
                 continue
             value = each.Get(self.time)
             if value is None:  # blocked

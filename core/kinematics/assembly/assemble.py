@@ -31,8 +31,8 @@ from ...trajectory import Array, BodyMotion
 from ..compiled.dense_equations import System
 from ..compiled.programs import Tracer
 from ..compiled.request import CONSISTENT, Request
-from ..formulation.constraints import Style
 from ..formulation.state_vectors import displaced, standing_drives, state_of
+from ..formulation.styles import MIXED, require_style
 
 MAX_ITERATIONS = 100
 # mu over |phi|^2: 0.01 to 1 serve alike on the strut; less lets singular Jacobians throw bodies
@@ -100,7 +100,7 @@ def assemble(
     values: Mapping[str, float] | None = None,
     *,
     tol: float = 1e-12,
-    style: str = "mixed",
+    style: str = MIXED,
 ) -> Assembled:
     """Close a mechanism from estimated poses.
 
@@ -159,11 +159,11 @@ class Closing:
     """The equations to close a mechanism at values of its drivers."""
 
     def __init__(
-        self, mechanism: Mechanism, values: Mapping[str, float], style: str = "mixed"
+        self, mechanism: Mechanism, values: Mapping[str, float], style: str = MIXED
     ) -> None:
         self.values, self.moving = values, tuple(body.name for body in mechanism.moving)
         self.tracer = Tracer(
-            mechanism, Request(tuple(values), (), self.moving, order=0, style=Style(style))
+            mechanism, Request(tuple(values), (), self.moving, order=0, style=require_style(style))
         )
         self.system = System(self.tracer)
         self.kept = [*self.tracer.selection.chosen]

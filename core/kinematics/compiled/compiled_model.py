@@ -34,12 +34,11 @@ from ...program.llvm.machine_code import available
 from ...trajectory import Array
 from ..formulation.constraints import Frames
 from ..formulation.state_vectors import samples
+from ..formulation.styles import MIXED, NATIVE
 from ..structure.components import Alike
 from ..structure.degrees_of_freedom import Selection
 from . import step_programs
 from .request import (
-    EARLIER,
-    FROM,
     LARGEST,
     LARGEST_OF_PARTS,
     MAX_ITERATIONS,
@@ -101,7 +100,8 @@ def load_or_trace(mechanism: Mechanism, request: Request, alike: Alike | None = 
     """
     compiled = request.compiled and available()
     lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
-    if alike or request.varied or not (is_builtin(mechanism) and compiled):
+    own = is_builtin(mechanism) and request.style in (NATIVE, MIXED)
+    if alike or request.varied or not (own and compiled):
         return _trace(mechanism, request, alike, lanes)
     content = _source() + pickle.dumps((mechanism, request, lanes))
 
@@ -338,8 +338,6 @@ class Model(Tracing):
         executor.put(self.sampled, sample[:, None])
         executor.run(*self.plan.onward)
         executor.carry()
-        # there is no step behind it
-        executor.put([self.slots[EARLIER + TIME]], executor.get([self.slots[FROM + TIME]]))
 
     def design_lanes(self, geometry: Array) -> Array:
         """Return all slots of lanes at the design position of variants, shape (slots, variants).

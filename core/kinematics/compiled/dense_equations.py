@@ -24,10 +24,9 @@ from ...program.llvm.jit import LlvmCode
 from ...program.llvm.machine_code import available
 from ...program.straight_line import bytecode
 from ...trajectory import Array
-from ..formulation.cartesian import Cartesian
-from ..formulation.constraints import Style
 from ..formulation.formulation import Configuration
 from ..formulation.state_vectors import samples
+from ..formulation.styles import NATIVE
 from .compiled_model import Model, is_builtin
 from .elements import AFTER, GEOMETRY, Elements
 from .programs import Tracer
@@ -109,8 +108,8 @@ class System:
         outputs, self._executors = tracer.outputs_of_rates(), dict[int, Executor]()
         compiled = compiled and available()
         tables, self._geometry, after = None, np.empty((0, 1)), ""
-        native = tracer.request.style is Style.NATIVE and is_builtin(tracer.mechanism)
-        if compiled and native and isinstance(formulation, Cartesian):
+        native = tracer.request.style == NATIVE and is_builtin(tracer.mechanism)
+        if compiled and native:
             found = Elements(formulation, tracer.layout, vector_width())
             self.rows, self.columns, self.sizes = found.rows, found.columns, {**found.sizes}
             self._geometry, after = found.geometry[:, None], AFTER

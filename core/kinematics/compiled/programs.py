@@ -26,7 +26,7 @@ from ...trajectory import QUANTITIES
 from ..forces.equations import BodyStates
 from ..formulation.acceptance_criteria import EPSILON
 from ..formulation.cartesian import Cartesian, PrescribedBody
-from ..formulation.constraints import Frames, Style, constraints, frames
+from ..formulation.constraints import Frames, frames
 from ..formulation.formulation import (
     GROUND_ACCELERATION,
     Acceleration,
@@ -35,8 +35,8 @@ from ..formulation.formulation import (
     motion_of_point,
 )
 from ..formulation.parameters import every_place, placed
-from ..formulation.relative import Formulation, Relative
 from ..formulation.state_vectors import turns
+from ..formulation.styles import NATIVE, formulate
 from ..structure.components import Alike, select_section
 from ..structure.degrees_of_freedom import Selection, select_rows
 from .request import (
@@ -134,11 +134,8 @@ class Tracer:
 
     def formulate(
         self, mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive]
-    ) -> Formulation:
-        found = constraints(mechanism, frame, drives, self.request.style, self.named)
-        if self.request.style is Style.RELATIVE:
-            return Relative.of(mechanism, frame, found)
-        return Cartesian(found, frame.moving)
+    ) -> Cartesian:
+        return formulate(mechanism, frame, self.request.style, drives, self.named)
 
     def _prescribed_body(self, name: str) -> PrescribedBody:
         """A prescribed body, its motion read from slots."""
@@ -307,9 +304,8 @@ class Tracer:
         return found
 
     def _native_rows(self) -> Rows:
-        formulation = self.formulation
-        if self.request.style is Style.NATIVE and isinstance(formulation, Cartesian):
-            return Rows(formulation, self.selection, self.factor)
+        if self.request.style == NATIVE:
+            return Rows(self.formulation, self.selection, self.factor)
         return native_rows(self.mechanism, self.frame, self.drives, self.at)
 
     def _store_motion(

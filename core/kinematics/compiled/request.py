@@ -14,7 +14,7 @@ from ...jet import Jet
 from ...program import ITERATIONS, MARGIN, Program, Tape, program
 from ...trajectory import QUANTITIES
 from ..forces.wanted import WantedForces
-from ..formulation.constraints import Style
+from ..formulation.styles import NATIVE
 
 # Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16
 # times the condition), where sigma is at least `FIRM`; where it is less, from a residual below as
@@ -67,7 +67,7 @@ class Request:
         drivers: names of the moving drivers; the others hold their design value, and cost nothing.
         points, bodies: names of the points and bodies whose motion is wanted.
         order: 0 positions, 1 and velocities, 2 and accelerations.
-        style: form of the rows.
+        style: row style.
         compiled: run by machine code if llvmlite is installed, else by numpy; the results are the
             same to round-off.
         state: keep the whole state of every sample, and its rates.
@@ -84,7 +84,7 @@ class Request:
     points: tuple[str, ...]
     bodies: tuple[str, ...] = ()
     order: int = 2
-    style: Style = Style.NATIVE
+    style: str = NATIVE
     compiled: bool = True
     state: bool = False
     varied: tuple[str, ...] = ()
@@ -106,8 +106,8 @@ PRESCRIBED = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
 """The vectors that tell how a prescribed body moves, and how many numbers each has [units and
 seconds].
 """
-FROM, EARLIER = "from ", "earlier "
-"""Before the names of what a lane is predicted from, and of what that was predicted from."""
+FROM = "from "
+"""Before the names of what a lane is predicted from."""
 PREDICTED = "predicted "
 """Before the names of the state that a lane was predicted to have."""
 BLOCKS = "", PREDICTED, FROM
@@ -242,7 +242,7 @@ def kept_motions(request: Request, state: Iterable[str]) -> list[str]:
         state: names of the vectors of the state.
     """
     order, names = request.order + 1, [*state]
-    found = [*names, *(PREDICTED + name for name in names), RATE, RATE_T] if request.state else []
+    found = [*names, RATE, RATE_T] if request.state else []
     found += names if request.slopes else []  # slopes begin at the solved poses
     found += [f"{label} {name}" for name in request.points for label in QUANTITIES[:order]]
     labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]

@@ -32,7 +32,6 @@ from ...program import (
     minimum,
     place_of,
     program,
-    where_larger,
 )
 from ...program.plan import shifted
 from ..formulation.acceptance_criteria import (
@@ -48,7 +47,6 @@ from ..formulation.formulation import EULER_PARAMETERS
 from .request import (
     ACCEPT,
     BLOCKS,
-    EARLIER,
     FROM,
     LARGEST_SIGMA,
     ORIENTATION,
@@ -69,18 +67,14 @@ WEIGHT, PAST = "weight", "past"
 """The vectors of the samples that a state is continued through: their weights, and where they are
 remembered their states.
 """
-ABOUT = 1.5
-"""A step may be this much longer than the one it learns from."""
 
 
 def carried_slots(tracer: Tracer) -> list[tuple[int, int]]:
     """Return pairs of slots to copy from a solved lane to the start of the next prediction."""
     sizes = {name: len(value) for name, value in tracer.formulation.design.items()}
-    sizes |= {PREDICTED + name: count for name, count in sizes.items()}
     sizes |= {RATE: tracer.unknowns, RATE_T: tracer.unknowns}
-    pairs = [(tracer.layout.scalar(FROM + TIME), tracer.layout.scalar(EARLIER + TIME))]
     told = TIME, *remembered_tests(tracer.blocks), *tracer.turns
-    pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(FROM + name)) for name in told]
+    pairs = [(tracer.layout.scalar(name), tracer.layout.scalar(FROM + name)) for name in told]
     pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(name)) for name in ACCEPT]
     for name, count in sizes.items():
         pairs += zip(
@@ -92,50 +86,30 @@ def carried_slots(tracer: Tracer) -> list[tuple[int, int]]:
 def continued_slots(tracer: Tracer) -> list[tuple[int, int]]:
     """Return the pairs of `carried_slots` still needed if lanes are continued through earlier ones.
 
-    Tests need them, predictions do not. A Taylor step after such lanes has no step behind it, and
-    no correction.
+    Tests need them, predictions do not.
     """
-    time, unknowns = tracer.layout.scalar(TIME), tracer.unknowns
     ahead = [
         slot
-        for name in tracer.formulation.design
-        for slot in tracer.layout.vectors[FROM + PREDICTED + name]
+        for name in (RATE, RATE_T)
+        for slot in tracer.layout.vector(FROM + name, tracer.unknowns)
     ]
-    ahead += [
-        slot for name in (RATE, RATE_T) for slot in tracer.layout.vector(FROM + name, unknowns)
-    ]
-    (_, earlier), *pairs = carried_slots(tracer)
-    return [(time, earlier), *(pair for pair in pairs if pair[1] not in ahead)]
+    return [pair for pair in carried_slots(tracer) if pair[1] not in ahead]
 
 
 def predict(tracer: Tracer) -> Program:
-    """Return the program of a Taylor step of second order, corrected by the error of the last such
-    step.
-
-    The error is of third order in any coordinates: it grows by the cube of the step. The correction
-    applies if the last step was about as long as this one, or longer.
-    """
+    """Return the program of a Taylor step of second order."""
     read, vector = tracer.read, tracer.vector
-    time, here, earlier = (read(label + TIME) for label in ("", FROM, EARLIER))
-    h, h_before = time - here, here - earlier
+    h = read(TIME) - read(FROM + TIME)
     v, a = vector(FROM + RATE, tracer.unknowns), vector(FROM + RATE_T, tracer.unknowns)
     step = [h * (v_k + (0.5 * h) * a_k) for v_k, a_k in zip(v, a, strict=True)]
     start = {
         name: vector(FROM + name, len(value)) for name, value in tracer.formulation.design.items()
     }
     taylor = tracer.formulation.retract(tracer.formulation.configuration(start), step)
-    part = h / h_before
-    lack = where_larger(ABOUT * h_before, h, part * part * part, 0.0)
     out: dict[int, Scalar] = {}
-    corrected: dict[str, list[Scalar]] = {}
     for name, value in taylor.items():
         tracer.store(out, PREDICTED + name, value)  # kept, to see what the iteration makes of it
-        solved, predicted = start[name], vector(FROM + PREDICTED + name, len(value))
-        corrected[name] = [
-            x + lack * (b - p) for x, b, p in zip(value, solved, predicted, strict=True)
-        ]
-        corrected[name] = _of_length_one(corrected[name])
-    tracer.store_state(out, corrected)
+        tracer.store(out, name, _of_length_one([*value]))
     return program("predict", tracer.tape, out, tracer.prepared)
 
 

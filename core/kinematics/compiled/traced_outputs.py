@@ -73,7 +73,6 @@ class TracedOutputs:
         """
         tracer, out = self._tracer, dict[int, Scalar]()
         formulation = tracer.formulation
-        assert isinstance(formulation, Cartesian)
         moved: dict[Traced, dict[int, Scalar]] = {}
 
         def follow(values: Sequence[Scalar]) -> list[Scalar]:
@@ -141,9 +140,7 @@ class TracedOutputs:
         for name in alone:
             rate = 1.0 if tracer.mechanism.driver(name).turns else 1.0 / tracer.frame.unit
             drives[name] = replace(drives.get(name, Drive()), c_t=rate)
-        found = tracer.formulate(tracer.mechanism, tracer.frame, drives)
-        assert isinstance(found, Cartesian)
-        return found
+        return tracer.formulate(tracer.mechanism, tracer.frame, drives)
 
     def _solve_alone(self, alone: tuple[str, ...]) -> tuple[list[Scalar], list[Scalar]]:
         tracer, own = self._tracer, self._formulation(alone)

@@ -21,7 +21,7 @@ from ...trajectory import Array
 from ..compiled.compiled_model import recent_model
 from ..compiled.dense_equations import System, system_of
 from ..compiled.request import Request
-from ..formulation.constraints import Style
+from ..formulation.styles import NATIVE, require_style
 from ..structure.degrees_of_freedom import require_driven
 from .pseudo_arclength import NODE, ArclengthWalk, CurvePoint, NearbyPoint
 from .singular_poses import Singularity, examine
@@ -130,7 +130,7 @@ def trace(
     points: Sequence[str] | None = None,
     longest: float = LONGEST,
     tol: float = 1e-12,
-    style: str = "native",
+    style: str = NATIVE,
 ) -> Curve:
     """Trace the motion from the design position; further drivers hold their design value.
 
@@ -162,7 +162,7 @@ def trace(
     every = [point.name for point in mechanism.points]
     wanted = names_of("trace", "points", every if points is None else points)
     require_known("trace", "point", wanted, mechanism.points)
-    request = Request((driver,), wanted, order=0, style=Style(style), compiled=False)
+    request = Request((driver,), wanted, order=0, style=require_style(style), compiled=False)
     model = recent_model(mechanism, request)
     system = system_of(model)
     walk = ArclengthWalk(system, Path({driver: Ramp(1.0)}, np.zeros(1)), tol)

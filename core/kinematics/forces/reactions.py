@@ -222,9 +222,7 @@ class ForceRows:
 
     def free(self, joint: Joint, found: Multipliers) -> Array:
         """Return the undetermined directions of a joint's wrench, shape (n, 6, redundant rows)."""
-        columns = np.moveaxis(found.free, 2, 0)
-        each = [np.hstack(self.wrench(joint, multipliers)) for multipliers in columns]
-        return np.stack(each, axis=2) if each else np.empty((self.n, 6, 0))
+        return free_wrench(self.equations, joint, found)
 
     def remainders(self, at: Configuration | None = None) -> Iterator[tuple[Array, Array]]:
         """Yield what is left of the rows by order of the motion, phi, J v - nu and J a - gamma, and
@@ -264,6 +262,16 @@ class ForceRows:
             own[column - bodies] = -left[k] / rows[k][column]
         moved = (sum(x * own[c - bodies] for c, x in row.items() if c >= bodies) for row in rows)
         return own, [x + y for x, y in zip(left, moved, strict=True)]
+
+
+def free_wrench(equations: ForceEquations, joint: Joint, found: Multipliers) -> Array:
+    """Return the undetermined directions of a joint's wrench, shape (n, 6, redundant rows)."""
+    n, _, redundant = found.free.shape
+    every = np.empty((n, 6, redundant))
+    for k in range(redundant):
+        pair: tuple[Vec3, Vec3] = equations.reaction(joint, [*found.free[:, :, k].T])
+        every[:, :, k] = columns_of([*pair[0], *pair[1]], n)
+    return every
 
 
 def _inverse(rows: Array) -> Array | None:

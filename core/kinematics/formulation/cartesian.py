@@ -1,7 +1,7 @@
 """The Cartesian formulation: six unknowns (dr, dpi) of every moving body, and all joints as rows.
 
 A joint's rotation or translation is a further unknown if it is named: by a coupling or by the
-style. dpi is in global axes, or in body axes if the row style is; the poses are the same.
+style. dpi is in global axes.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any
 
-from ...algebra import Quat, Scalar, Vec3, is_literal_zero, quat, turned_by, vec
+from ...algebra import Quat, Scalar, is_literal_zero, quat, turned_by, vec
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Primitive, Row, Twist
 from ...program import cos, sin
-from .constraints import Constraint, Frames, Relation, Style, constraints
+from .constraints import Constraint, Frames, Relation, constraints
 from .formulation import GROUND_ACCELERATION, Acceleration, Condition, Configuration, Rows, State
 
 COLUMNS = 6
@@ -53,14 +53,15 @@ class Cartesian:
         mechanism: Mechanism,
         frame: Frames,
         drives: Mapping[str, Drive] | None = None,
-        style: Style = Style.NATIVE,
         named: Collection[str] = (),
+        *,
+        mixed: bool = False,
     ) -> Cartesian:
         """Return all constraints of a mechanism over its moving bodies; see `constraints`.
 
         Drivers without a drive hold their design value.
         """
-        return cls(constraints(mechanism, frame, drives or {}, style, named), frame.moving)
+        return cls(constraints(mechanism, frame, drives or {}, named, mixed=mixed), frame.moving)
 
     @cached_property
     def columns(self) -> Mapping[str, int]:
@@ -94,6 +95,11 @@ class Cartesian:
     def owners(self) -> Sequence[tuple[str, str]]:
         """For every row, its joint or driver and its primitive."""
         return [*map(_names, self.of_rows)]
+
+    @property
+    def row_names(self) -> list[str]:
+        """A readable name of every row: its joint or driver, and its primitive."""
+        return [f"{owner}: {primitive}" for owner, primitive in self.owners]
 
     @cached_property
     def of_rows(self) -> Sequence[Constraint | Relation]:
@@ -143,10 +149,6 @@ class Cartesian:
                     waiting.append(b)
         return far
 
-    @cached_property
-    def _body_axes(self) -> bool:
-        return any(c.primitive.body_axes for c in self.constraints if isinstance(c, Constraint))
-
     def configuration(self, state: State) -> Configuration:
         """Return the poses of a state."""
         poses = {name: each.pose for name, each in self.prescribed.items()}
@@ -158,10 +160,7 @@ class Cartesian:
         """Return the state after a step of the unknowns, exact to second order."""
         state: dict[str, Sequence[Scalar]] = {}
         for name, k in self.columns.items():
-            dr, dpi = (
-                vec(step[k : k + 3]),
-                self._global(at.poses[name], vec(step[k + 3 : k + COLUMNS])),
-            )
+            dr, dpi = vec(step[k : k + 3]), vec(step[k + 3 : k + COLUMNS])
             state[f"u {name}"] = tuple(at.poses[name].u + dr)
             state[f"q {name}"] = tuple(turned_by(at.poses[name].q, 0.5 * dpi))
         for name, k in self.coordinates.items():
@@ -172,7 +171,7 @@ class Cartesian:
         """Return the rates of the state at rates of the unknowns."""
         state: dict[str, Sequence[Scalar]] = {}
         for name, k in self.columns.items():
-            half = 0.5 * self._global(at.poses[name], vec(rates[k + 3 : k + COLUMNS]))
+            half = 0.5 * vec(rates[k + 3 : k + COLUMNS])
             state[f"u {name}"] = tuple(rates[k : k + 3])
             state[f"q {name}"] = tuple(Quat(0.0, half) * at.poses[name].q)
         for name, k in self.coordinates.items():
@@ -275,30 +274,20 @@ class Cartesian:
 
     def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
         """Return the twists of the bodies at unknown rates v."""
-        return {
-            name: Twist(twist.v, self._global(at.poses[name], twist.w))
-            for name, twist in self._by_body(v).items()
-        }
+        return self._by_body(v)
 
     def accelerations(
         self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]
     ) -> Mapping[str, Acceleration]:
         """Return the accelerations of the bodies at unknown rates v and accelerations a."""
-        # A w' differentiated is A w'dot + w x w, and the last is zero
-        return {
-            name: Acceleration(twist.v, self._global(at.poses[name], twist.w))
-            for name, twist in self._by_body(a).items()
-        }
+        return {name: Acceleration(each.v, each.w) for name, each in self._by_body(a).items()}
 
     def _by_body(self, v: Sequence[Scalar]) -> dict[str, Twist]:
-        """Return the unknowns by body, in the axes of the rows."""
+        """Return the unknowns by body."""
         return {
             name: Twist(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS]))
             for name, k in self.columns.items()
         }
-
-    def _global(self, pose: Pose, w: Vec3) -> Vec3:
-        return pose.turn(w) if self._body_axes else w
 
     def _sparse(self, row: Row, c: Constraint) -> dict[int, Scalar]:
         entries: dict[int, Scalar] = {}

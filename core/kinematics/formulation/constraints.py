@@ -11,8 +11,7 @@ import math
 from collections import defaultdict
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
-from typing import Any, Never, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from ... import primitives as p
 from ...algebra import ZERO, Scalar, Vec3, vec
@@ -121,36 +120,21 @@ def unit_near(length: float) -> float:
     return 2.0 ** round(math.log2(length))
 
 
-class Style(StrEnum):
-    """Style of the rows; all styles have the same solutions and share the solver."""
-
-    NATIVE = "native"
-    PAPER = "paper"
-    CONVENTIONAL = "conventional"
-    MIXED = "mixed"
-    RELATIVE = "relative"
-
-    @classmethod
-    def _missing_(cls, value: object) -> Never:
-        raise SolveError(f"there is no style {value!r}; known: {', '.join(cls)}")
-
-
 def constraints(
     mechanism: Mechanism,
     frame: Frames,
     drives: Mapping[str, Drive],
-    style: Style = Style.NATIVE,
     named: Collection[str] = (),
+    *,
+    mixed: bool = False,
 ) -> list[Constraint | Relation]:
     """Return all constraints: joints in order, then couplers, then drivers in order.
 
     Args:
         drives: the motion of each driver by name; drivers not named hold their design value.
-        style: style of the rows. MIXED and RELATIVE name the coordinates of all axial joints, the
-            others those of couplers.
-        named: further coordinates to name, as JOINT.rotation or JOINT.translation.
+        named: coordinates to name beside those of couplers, as JOINT.rotation or JOINT.translation.
+        mixed: name the coordinates of all axial joints.
     """
-    mixed = style in (Style.MIXED, Style.RELATIVE)
     coupled = {
         f"{joint}.{freedom}"
         for coupler in mechanism.couplers
@@ -166,11 +150,10 @@ def constraints(
     for coupler in mechanism.couplers:
         weights = {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms}
         found.append(_relation(coupler.name, weights, frame, coupler.curve))
-    found += [
+    return found + [
         _driver_constraint(mechanism, frame, each, drives.get(each.name, Drive()), mixed)
         for each in mechanism.drivers
     ]
-    return _restyle(found, style)
 
 
 def constraints_left_out(mechanism: Mechanism, frame: Frames) -> list[Constraint]:
@@ -271,21 +254,6 @@ def _driver_constraint(
     scaled, i, j = frame.attach(joint)
     primitive: Any = scaled.measured(driver.freedom, i, j)
     return Constraint(driver.name, replace(primitive, drive=drive), joint.i, joint.j)
-
-
-def _restyle(found: Sequence[Constraint | Relation], style: Style) -> list[Constraint | Relation]:
-    """Return the constraints with every primitive replaced by its equivalents in the style."""
-    if style not in (Style.PAPER, Style.CONVENTIONAL):
-        return list(found)
-    styled: list[Constraint | Relation] = []
-    for c in found:
-        if isinstance(c, Relation):
-            styled.append(c)
-        else:
-            paper = style is Style.PAPER
-            forms = c.primitive.paper_form() if paper else c.primitive.conventional_form()
-            styled += [replace(c, primitive=form) for form in forms]
-    return styled
 
 
 def coordinates_of(c: Constraint | Relation) -> tuple[str, ...]:

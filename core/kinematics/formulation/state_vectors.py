@@ -16,9 +16,9 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Driver, JointAngle, Path
 from ...primitives.base import GROUND_POSE, Drive, Pose
 from ...trajectory import Array
+from .cartesian import COLUMNS, Cartesian
 from .constraints import Frames
 from .formulation import Configuration, Rows, position_of
-from .relative import Formulation
 
 
 def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:
@@ -104,7 +104,7 @@ def columns_of(scalars: Iterable[Scalar], n: int) -> Array:
 
 
 def state_of(
-    formulation: Formulation,
+    formulation: Cartesian,
     mechanism: Mechanism,
     frame: Frames,
     poses: Mapping[str, Pose],
@@ -141,7 +141,7 @@ def state_of(
     return state
 
 
-def jacobian(formulation: Formulation, at: Configuration | None = None) -> Array:
+def jacobian(formulation: Cartesian, at: Configuration | None = None) -> Array:
     """Return the Jacobian of all rows at a configuration, or at design [units of the frames].
 
     The shape is (rows, unknowns).
@@ -157,3 +157,11 @@ def dense(rows: Rows, unknowns: int, n: int) -> Array:
         for column, value in row.items():
             found[:, k, column] = value
     return found
+
+
+def moved_most(columns: Mapping[str, int], motion: Array) -> tuple[str, Array]:
+    """Return the body moved most by a motion of the unknowns, and its part (dr, dpi)."""
+    name, first = max(
+        columns.items(), key=lambda each: float(np.linalg.norm(motion[each[1] : each[1] + COLUMNS]))
+    )
+    return name, motion[first : first + COLUMNS]

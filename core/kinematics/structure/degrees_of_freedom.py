@@ -32,7 +32,6 @@ from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, frames, measured
-from ..formulation.relative import Formulation, row_names
 from ..formulation.state_vectors import jacobian
 from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independent_rows
 
@@ -107,7 +106,7 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     formulation, matrix = _matrix(mechanism, frame)
     joint_rows = len(matrix) - len(mechanism.drivers)
     kept = set(independent_joint_rows(formulation, matrix[:joint_rows]))
-    names = row_names(formulation)
+    names = formulation.row_names
     redundant = [names[k] for k in range(joint_rows) if k not in kept]
     return freedom_account(mechanism, formulation.unknowns, joint_rows, redundant)
 
@@ -152,7 +151,7 @@ def driven_account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
 
 
 def select_rows(
-    mechanism: Mechanism, frame: Frames, formulation: Formulation, wanted: Sequence[int] = ()
+    mechanism: Mechanism, frame: Frames, formulation: Cartesian, wanted: Sequence[int] = ()
 ) -> Selection:
     """Select the rows of a formulation to solve, drivers first.
 
@@ -171,15 +170,15 @@ def select_rows(
     return selection_of(found, formulation, kept)
 
 
-def selection_of(found: FreedomAccount, formulation: Formulation, kept: Sequence[int]) -> Selection:
+def selection_of(found: FreedomAccount, formulation: Cartesian, kept: Sequence[int]) -> Selection:
     """Return the selection of rows, with the names of the others in the account."""
-    names, solved = row_names(formulation), set(kept)
+    names, solved = formulation.row_names, set(kept)
     dropped = tuple(k for k in range(len(names)) if k not in solved)
     redundant = tuple(names[k] for k in dropped)
     return Selection(replace(found, redundant_rows=redundant), tuple(kept), dropped)
 
 
-def _locked_message(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> str:
+def _locked_message(mechanism: Mechanism, formulation: Cartesian, matrix: Array) -> str:
     """Return the message on drivers that do not move the mechanism at the design position.
 
     The message names these drivers, and the joints and drivers that hold them.

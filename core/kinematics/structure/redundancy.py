@@ -39,7 +39,6 @@ from ...trajectory import Array, BodyMotion
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, frames, unit_near
 from ..formulation.formulation import Condition
-from ..formulation.relative import Formulation
 from ..formulation.state_vectors import displaced, jacobian
 
 # Rows are of size one. At a feasible pose a redundant row leaves round-off (1e-15); the smallest
@@ -89,7 +88,7 @@ def independent_rows(matrix: Array, last: int, conditions: Sequence[Condition] =
     return sorted([*taken, *(k for each in kept for k in each.rows)])
 
 
-def independent_joint_rows(formulation: Formulation, matrix: Array) -> list[int]:
+def independent_joint_rows(formulation: Cartesian, matrix: Array) -> list[int]:
     """Return the indices of a largest independent set of joint rows, a formulation's first rows."""
     return independent_rows(
         matrix, 0, [each for each in formulation.conditions if each.rows[-1] < len(matrix)]

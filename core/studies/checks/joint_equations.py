@@ -14,8 +14,8 @@ import numpy as np
 
 from ...algebra import Quat, quat, vec
 from ...joints import Attachment, AxialJoint, Kind
-from ...kinematics import Style
-from ...primitives.base import Drive, NoFormError, Pose, Twist
+from ...kinematics import MIXED
+from ...primitives.base import Drive, Pose, Twist
 from ...trajectory import Array
 from .findings import (
     AMPLIFIED,
@@ -162,25 +162,10 @@ def intended_branch(s: Specimen) -> Iterator[Finding]:
 
 
 def cost(s: Specimen) -> Iterator[Finding]:
-    """Count the operations of the traced equations, and of the conventional
-    form where one exists.
-    """
-
-    def flops(t: TracedJoint) -> str:
-        return ", ".join(f"{name} {t.programs[name].flops}" for name in ("phi", "rows", "gamma"))
-
-    other = _conventional(s)
-    text = f"flops {flops(s.traced)}"
-    text += f"; in conventional form {flops(other)}" if other is not None else ""
-    total = sum(s.traced.programs[name].flops for name in ("phi", "rows", "gamma"))
-    yield Finding("operations", Verdict.PASS, float(total), message=text)
-
-
-def _conventional(s: Specimen) -> TracedJoint | None:
-    try:
-        return TracedJoint(s.joint, s.place, Style.CONVENTIONAL)
-    except NoFormError:  # a user's primitive has no conventional form
-        return None
+    """Count the operations of the traced equations."""
+    flops = {name: s.traced.programs[name].flops for name in ("phi", "rows", "gamma")}
+    text = ", ".join(f"{name} {count}" for name, count in flops.items())
+    yield Finding("operations", Verdict.PASS, float(sum(flops.values())), message=f"flops {text}")
 
 
 def round_off(s: Specimen) -> Iterator[Finding]:
@@ -201,13 +186,8 @@ def round_off(s: Specimen) -> Iterator[Finding]:
     tiny = 1e-8
     shift = tiny * s.rng.normal(size=(s.traced.columns, 8))
     near = s.traced.retract(s.traced.design(8), shift)
-    lost = {"here": error(s.traced, near).max() / tiny}
-    other = _conventional(s) if not s.traced.coordinates else None
-    if other is not None:
-        lost["in conventional form"] = error(other, near).max() / tiny
-    text = f"of a displacement of {tiny:g} from the design phi loses " + ", ".join(
-        f"{x:.1g} {where}" for where, x in lost.items()
-    )
+    lost = error(s.traced, near).max() / tiny
+    text = f"of a displacement of {tiny:g} from the design phi loses {lost:.1g}"
     off = error(s.traced, s.state[:, :8])
     yield judge_figures("round-off", off, ROUND_OFF, s.traced.names, text)
 
@@ -308,7 +288,7 @@ def named_coordinates(s: Specimen) -> Iterator[Finding]:
     if not isinstance(s.joint, AxialJoint):
         yield skip("mixed style", "no AxialJoint: it has no coordinates of its own")
         return
-    mixed = TracedJoint(s.joint, s.place, Style.MIXED)
+    mixed = TracedJoint(s.joint, s.place, MIXED)
     own = slice(2 * COLUMNS, None)
     still = np.zeros((len(mixed.coordinates), s.lanes))
     state = np.concatenate([s.state[:POSES], still])

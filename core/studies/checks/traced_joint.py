@@ -25,7 +25,7 @@ from ...algebra import Quat, quat, vec
 from ...errors import MechanismError
 from ...jet import Jet, sqrt
 from ...joints import Joint
-from ...kinematics import COLUMNS, Cartesian, Frames, Relation, Style, constraints
+from ...kinematics import COLUMNS, NATIVE, Cartesian, Frames, Relation, formulate
 from ...mechanism.mechanism import Body, Mechanism
 from ...program import Program, Tape, program
 from ...program.tape import OPERATIONS
@@ -154,17 +154,16 @@ class TracedJoint:
         programs: phi, rows, nu, gamma and branch, over the slots of a state and a rate.
 
     Raises:
-        MechanismError: there are no equations, they disagree in number, or are in body axes.
+        MechanismError: there are no equations, or they disagree in number.
     """
 
-    def __init__(self, joint: Joint, place: Place, style: Style = Style.NATIVE) -> None:
+    def __init__(self, joint: Joint, place: Place, style: str = NATIVE) -> None:
         mechanism = Mechanism("joint", [Body(name) for name in BODIES], [joint])
         origins = {
             name: (1.0 / place.unit) * vec(origin)
             for name, origin in zip(BODIES, place.origins, strict=True)
         }
-        found = constraints(mechanism, Frames(place.unit, origins, BODIES), {}, style)
-        equations = Cartesian(found, BODIES)
+        equations = formulate(mechanism, Frames(place.unit, origins, BODIES), style)
         self.coordinates = tuple(equations.coordinates)
         self.columns = equations.unknowns
         self.size = POSES + len(self.coordinates)
@@ -172,7 +171,7 @@ class TracedJoint:
         self._trace(equations)
         self.names: list[str] = []
         self.parts: list[tuple[int, int]] = []
-        for each in found:
+        for each in equations.constraints:
             kind, count = (
                 (Relation, 1)
                 if isinstance(each, Relation)
@@ -191,12 +190,6 @@ class TracedJoint:
             raise MechanismError(
                 f"{joint}: {found_them}, expected {len(self.names)} of each, the sum of n of its"
                 " primitives"
-            )
-        if style is Style.NATIVE and any(
-            not isinstance(each, Relation) and each.primitive.body_axes for each in found
-        ):
-            raise MechanismError(
-                f"{joint}: its primitives have rows in body axes. Write them in global axes."
             )
 
     def _trace(self, equations: Cartesian) -> None:

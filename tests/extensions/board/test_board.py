@@ -6,19 +6,18 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import kincheck
 import numpy as np
 import pytest
-from kincheck.core.case.case import Free
 from kincheck.core.cli.main import main
 from kincheck.core.doors import offers
 from kincheck.core.extensions.board.page import report
 from kincheck.core.extensions.board.results import Board, Row, Run, TruthFacts
 from kincheck.core.extensions.board.run import better, order_and_floor
 from kincheck.core.extensions.board.truth import truth_of
+from kincheck.core.extensions.free.section import Free, with_free
 from kincheck.core.extras import python_of
 from msgspec.structs import replace as replace_row
 
@@ -207,10 +206,10 @@ def test_stepper_forces_equal_truth(rows):
 
 
 def test_undetermined_forces_are_left_open():
-    truth = truth_of(replace(kincheck.load("bricard"), free=Free(0.01, 2)))
+    truth = truth_of(with_free(kincheck.load("bricard"), Free(0.01, 2)))
     assert np.isfinite(truth.reactions).all()
     assert truth.facts.forces
-    assert not truth_of(replace(kincheck.load("bennett"), free=Free(0.01, 2))).facts.forces
+    assert not truth_of(with_free(kincheck.load("bennett"), Free(0.01, 2))).facts.forces
     assert np.abs(truth.reactions[..., 3:]).max() > 0.1
     head, *values = truth.tables([], 1)["reactions.csv"].splitlines()
     assert len(values) == 1
@@ -303,7 +302,7 @@ def test_board_truth_equals_free(site, rows):
 
 
 def test_board_truth_of_turned_body():
-    case = replace(kincheck.load("mcpherson_strut_loaded"), free=Free(0.05, 3))
+    case = with_free(kincheck.load("mcpherson_strut_loaded"), Free(0.05, 3))
     truth, found = truth_of(case), kincheck.free(case)
     place, _ = truth.frames["knuckle"].at([0.975, 0.715, 0.101])
     assert place[:, 1] - 0.715 == pytest.approx(found.outputs["half_track_change"], abs=1e-12)

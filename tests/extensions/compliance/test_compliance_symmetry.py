@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core.case.case import Rig
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.compliance.section import Rig
 from kincheck.core.extensions.compliance.study import compliance
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.mechanism.loads import SpringDamper
@@ -60,7 +60,7 @@ def axle_of(folder, template, capsys, motion):
         for k in range(2)
     ]
     mechanism = replace(mechanism, forces=(*mechanism.forces, *springs))
-    return replace(case, mechanism=mechanism, rig=Rig(tire_stiffness=2e5))
+    return replace(case, mechanism=mechanism, tables={"compliance": Rig(tire_stiffness=2e5)})
 
 
 CHEAP = ("mcpherson", "five_link", "semi_trailing_arm")
@@ -301,7 +301,7 @@ def test_asked_output_never_vanishes(tmp_path, capsys):
     (file := tmp_path / "asked.json").write_text(json.dumps(case))
     files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "csv", "out")]
     assert main(["kc", str(file), "--travel=10mm:3", "--axle=roll", *files]) == 0
-    printed, notes = capsys.readouterr()
+    printed, _ = capsys.readouterr()
     found = json.loads((tmp_path / "json").read_text())
     comment, heads = (tmp_path / "csv").read_text().splitlines()[:2]
     page = (tmp_path / "out" / "kc.html").read_text()
@@ -309,7 +309,7 @@ def test_asked_output_never_vanishes(tmp_path, capsys):
         name = output.name
         if name in MISSING:
             assert MISSING[name] in found["not_computed"][name]
-            for said in (notes, comment, page):
+            for said in (printed, comment, page):
                 assert f"not computed: {name}: " in said
         else:
             assert f"  {name}" in printed

@@ -18,6 +18,7 @@ from kincheck.core.doors import offers
 from kincheck.core.joints import Coupler
 from kincheck.core.mechanism.loads import ELEMENTS
 
+from ...support.by_night import sparse_by_day
 from ...support.engine_motion import SIMULATORS, installed
 from ...support.one_freedom import (
     ARM,
@@ -110,7 +111,7 @@ def test_equilibrium_equals_root(engine, name, tmp_path):
     assert record.outputs["tip.z"].position == pytest.approx([height], abs=1e-13)
 
 
-@EVERY
+@pytest.mark.parametrize("name", sparse_by_day(SUBJECTS, 3))
 def test_free_motion_equals_integration(name, tmp_path):
     times = np.linspace(0.0, 0.5, 6)
     free = {"duration": 0.5, "samples": 6, "rates": {"pin": RATE}}

@@ -39,7 +39,7 @@ def swing(t, length, start):
 
 
 def test_free_pendulum_swings_by_elliptic_functions():
-    t = np.linspace(0.0, 3.0, 13)
+    t = np.linspace(0.0, 1.5, 7)  # nearly a period
     found = free_motion(pendulum(), t)
     angle = swing(t, 0.7, 1.2)
     expected = 0.7 * np.stack([0.0 * t, np.sin(angle), -np.cos(angle)], axis=1)
@@ -114,14 +114,14 @@ def slider(mass=2.0, **load):
 
 
 @pytest.mark.parametrize(
-    ("k", "c", "method"),
-    [(40.0, 4000.0, "Radau"), (4e4, 200.0, "DOP853")],
+    ("k", "c", "end", "method"),
+    [(40.0, 4000.0, 1.0, "Radau"), (4e4, 200.0, 0.3, "DOP853")],
     ids=["creeps", "comes to rest"],
 )
-def test_damped_block_follows_its_closed_form(k, c, method):
+def test_damped_block_follows_its_closed_form(k, c, end, method):
     mass, ahead = 2.0, -0.1
     found = free_motion(
-        slider(mass, stiffness=k, damping=c, free_length=2.0 + ahead), np.linspace(0.0, 1.0, 6)
+        slider(mass, stiffness=k, damping=c, free_length=2.0 + ahead), np.linspace(0.0, end, 4)
     )
     root = cmath.sqrt((c / mass) ** 2 - 4.0 * k / mass)
     slow, fast = -(2.0 * k / mass) / (c / mass + root), -(c / mass + root) / 2.0
@@ -144,6 +144,7 @@ def test_torsional_spring_swings_beyond_turns():
     assert np.abs(p[:, 0] - np.cos(0.5 * angle)).max() < 1e-12
 
 
+@pytest.mark.nightly
 def test_andrews_squeezer_free_reaches_published_angles():
     # 80-bit floats, seven angles, order 16; the IVP test set prints them to about ten digits
     mechanism = kincheck.load("andrews_squeezer").mechanism
@@ -229,7 +230,7 @@ type = "joint_angle"
 joint = "hinge"
 [free]
 rates = {hinge = 540.0}
-duration = 4.0
+duration = 2.0
 samples = 3
 """
 
@@ -248,7 +249,7 @@ def test_free_command_counts_turns_between_samples(case, tmp_path):
     assert head == ["time", "angle"]
     # beyond the top: sin(angle / 2) = sn(w0 t / 2, m), m = 4 g / (l w0^2)
     w0 = 3.0 * math.pi
-    t = np.array([0.0, 2.0, 4.0])
+    t = np.array([0.0, 1.0, 2.0])
     _, _, _, amplitude = ellipj(0.5 * w0 * t, 4.0 * G / (0.7 * w0**2))
     found = np.array([[float(x) for x in row] for row in rows])
     assert found[:, 0] == pytest.approx(t)
@@ -257,18 +258,19 @@ def test_free_command_counts_turns_between_samples(case, tmp_path):
 
 def test_python_free_returns_case_outputs(case):
     found = kincheck.free(case)
-    assert found.times.tolist() == [0.0, 2.0, 4.0]
-    assert kincheck.free(case, duration=1.0, samples=2).times[-1] == 1.0
+    assert found.times.tolist() == [0.0, 1.0, 2.0]
+    assert kincheck.free(case, duration=0.2, samples=2).times[-1] == 0.2
     assert found.facts["outputs"]["angle"] == found.outputs["angle"].tolist()
 
 
 def test_free_case_file_round_trip(case, tmp_path):
     from kincheck.core.case.io.case_file import case_text, load_case
+    from kincheck.core.extensions.free.section import free_in
 
     again = tmp_path / "again.toml"
     again.write_text(case_text(load_case(case)))
-    assert load_case(again).free == load_case(case).free
-    assert load_case(case).free.rates == {"hinge": pytest.approx(3.0 * math.pi)}
+    assert free_in(load_case(again)) == free_in(load_case(case))
+    assert free_in(load_case(case)).rates == {"hinge": pytest.approx(3.0 * math.pi)}
 
 
 @pytest.mark.parametrize(
@@ -276,7 +278,7 @@ def test_free_case_file_round_trip(case, tmp_path):
     [
         ("hinge = 540.0", "knee = 540.0", "free.rates"),
         ("samples = 3", "samples = 1", "free.samples"),
-        ("duration = 4.0", "", "free.duration: missing"),
+        ("duration = 2.0", "", "free.duration: missing"),
     ],
 )
 def test_bad_free_table_names_its_key(case, old, new, message):

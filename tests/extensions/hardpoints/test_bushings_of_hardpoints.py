@@ -185,7 +185,7 @@ def test_kc_lists_slopes_without_value(tmp_path, capsys):
     assert main(["kc", str(table), "--travel=-10mm:10mm", *files]) == 0
     said = capsys.readouterr()
     assert "–" not in said.out
-    assert "not computed: roll_center_height.per_travel, jacking_coefficient.per_travel" in said.err
+    assert "not computed: roll_center_height.per_travel, jacking_coefficient.per_travel" in said.out
     found = json.loads((tmp_path / "json").read_text())
     assert len(found["travel"]) == 25
     assert not {"spring_ratio.per_travel"} & {*found["outputs"], *found["rigid"]}

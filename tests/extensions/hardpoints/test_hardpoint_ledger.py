@@ -1,12 +1,14 @@
 """What tables of hardpoints and files beside them have is read, listed, or stops by name."""
 
 import json
+import random
 import re
 
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 
 from ...support.case_texts import write
@@ -57,3 +59,74 @@ def test_unknown_name_of_table_is_listed(tmp_path):
     }.items():
         case = load(write(tmp_path, text, name), Supplied(template="double_wishbone"))
         assert NAME in case.source, name
+
+
+def a_table(rng):
+    """Lines of a table, and how many of each sort: comments, facts, columns, points, other rows."""
+    columns = rng.sample(["meaning", "supplier", "mass", "torque"], rng.randint(0, 4))
+    comments = [f"# remark {k}" for k in range(rng.randint(0, 3))]
+    facts = ["# units: mm", "# axes: forward,left,up"]
+    titles = [f"title {k}" for k in range(rng.randint(0, 2))]
+    points = TEMPLATES["double_wishbone"].sample
+    rows = [
+        ",".join([name, *(f"{1000.0 * x:g}" for x in place), *("5" for _ in columns)])
+        for name, place in points.items()
+    ]
+    more = [f"{NAME}{k},1,2,3{',5' * len(columns)}" for k in range(rng.randint(0, 2))]
+    gaps = [f"gap {k},,,{',5' * len(columns)}" for k in range(rng.randint(0, 2))]
+    head = ",".join(["name", "x", "y", "z", *columns])
+    body = [*rows, *more, *gaps]
+    rng.shuffle(body)
+    above = [*comments, *facts, *titles]
+    rng.shuffle(above)
+    counts = {
+        "comments": len(comments),
+        "columns": len(columns),
+        "rows": len(titles) + len(gaps),
+        "points": len(rows) + len(more),
+    }
+    return [*above, head, *body], counts
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_account_of_table_adds_up(seed, tmp_path):
+    """What is read and what is listed are all lines and columns."""
+    lines, counts = a_table(random.Random(seed))
+    table = read_hardpoints(write(tmp_path, "\n".join(lines), "car.csv"))
+    assert (table.unit, table.axes) == ("mm", "forward,left,up")
+    assert len(table.points) == counts["points"]
+    (comments,) = [int(each.split()[0]) for each in table.left_out if "of comments" in each] or [0]
+    assert comments == counts["comments"]
+    assert sum(each.startswith("column ") for each in table.left_out) == counts["columns"]
+    assert sum(each.startswith("line ") for each in table.left_out) == counts["rows"]
+    assert len(table.left_out) == bool(comments) + counts["columns"] + counts["rows"]
+
+
+def test_other_sheets_and_columns_are_listed(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["name", "x", "y", "z"])
+    for name, place in TEMPLATES["double_wishbone"].sample.items():
+        book.active.append([name, *place])
+    book.active.cell(3, 6, "beside")
+    book.create_sheet("springs").append(["rate", 5])
+    book.save(tmp_path / "car.xlsx")
+    found = read_hardpoints(tmp_path / "car.xlsx")
+    assert found.left_out == ["column 6, which has no head", "sheet 'springs'"]
+
+
+def test_remark_beside_coordinate_is_listed(tmp_path):
+    rows = [f"p{k}_{axis},{k},mm,checked" for k in range(2) for axis in "xyz"]
+    found = read_hardpoints(write(tmp_path, "\n".join(rows), "car.csv"), Supplied("mcpherson"))
+    assert len(found.points) == 2
+    assert found.left_out == [f"line {k} (checked)" for k in range(1, 7)]
+
+
+@pytest.mark.parametrize("name", ["car.csv", "car.m", "car.py"])
+def test_contradicting_facts_are_refused(name, tmp_path):
+    sign = "%" if name == "car.m" else "#"
+    facts = "".join(f"{sign} units: {unit}\n" for unit in ("mm", "MM", "m"))
+    assigned = "a = [1, 2, 3]\nb = [1, 2, 4]\nc = [1, 2, 5]\n"
+    text = "name,x,y,z\na,1,2,3\n" if name == "car.csv" else assigned
+    with pytest.raises(CaseError, match="found unit 'm', and 'mm' above, expected one"):
+        read_hardpoints(write(tmp_path, facts + text, name), Supplied("mcpherson"))

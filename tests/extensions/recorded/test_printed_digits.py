@@ -225,6 +225,51 @@ def test_planar_poses_are_judged(recorded):
     assert "read as euler 3 inverted the gap is within" in record["message"]
 
 
+RATES = {
+    "in one": "velocity vx vy w, acceleration ax ay alpha",
+    "apart": "velocity vx vy, omega w, acceleration ax ay, alpha alpha",
+    "in space": "velocity vx vy zero, omega zero zero w",
+    "angle alone in degrees": "velocity vx vy w [deg/s]",
+}
+
+
+def planar_rates(turn, unit, faster=1.0, slope=1.0):
+    """Return the crank's planar poses at a place of it, and their rates; the turn's has all digits
+    in degrees.
+    """
+    x, y = (P - B) * 0.5
+    c, s, none = np.cos(turn), np.sin(turn), 0.0 * turn
+    place, along = (c * x - s * y, s * x + c * y), (-s * x - c * y, c * x - s * y)
+    rows = {
+        "turn": turn,
+        **dict(zip(("x", "y", "theta"), (*place, turn), strict=True)),
+        **dict(zip(("vx", "vy"), along, strict=True)),
+        "w": faster * np.degrees(1.0 + none),
+        **dict(zip(("ax", "ay"), (-place[0], -place[1]), strict=True)),
+        "alpha": none,
+        "zero": none,
+    }
+    rows["vx"] = slope * rows["vx"]
+    head = ",".join(name if name == "turn" else f"crank.{name}" for name in rows)
+    head = head.replace(".w,", f".w{unit},")
+    table = np.column_stack([*rows.values()]).tolist()
+    return "\n".join([head, *(",".join(map(repr, row)) for row in table)])
+
+
+@pytest.mark.parametrize("form", RATES)
+def test_planar_velocities_are_judged(recorded, form):
+    turn, unit = GRIDS["even"], "" if "degrees" in form else " [deg/s]"
+    x, y = (P - B) * 0.5
+    pose = f"crank=crank: x y theta, frame {x} {y} 0 1 0 0 0, {RATES[form]}"
+    status, record = recorded(planar_rates(turn, unit), "--map", pose)
+    assert status == 0, record["message"]
+    assert record["details"]["rows"]["velocity"] < 1e-12
+    for wrong in (planar_rates(turn, unit, 1.01), planar_rates(turn, unit, slope=1.01)):
+        status, record = recorded(wrong, "--map", pose)
+        assert status == 1
+        assert record["details"]["rows"]["velocity"] > 5e-4
+
+
 def test_pose_without_attitude_is_refused(recorded, capsys):
     text = planar(GRIDS["even"], "", 1.0).replace("theta", "z")
     options = [word.replace("theta", "z") for word in PLANAR]

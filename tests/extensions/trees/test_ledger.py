@@ -149,6 +149,33 @@ def test_misspelt_name_is_named(kind, tmp_path):
         assert new in told or stops or is_listed(told, tags), (old, new, tags, told)
 
 
+def contents_of_usd(text):
+    """Number of prims and of what they and the stage say, by their text. The reader adds a prim's
+    name, path, schemas, place and variants, and five facts of the stage; a place is its operations.
+    """
+    prims = len(re.findall(r"^def ", text, re.MULTILINE))
+    inside = re.sub(r"^def [^{]*", "", text.partition(")")[2], flags=re.MULTILINE)
+    said = [each[1] for each in re.finditer(r"(\S+)(?:\.timeSamples)? = ", inside)]
+    return 1 + 5 + 6 * prims + sum(not each.startswith("xformOp") for each in said)
+
+
+ODD = {"float2": "(1, 2)", "double[]": "[1, 2]", "matrix2d": "((1, 0), (0, 1))"}
+"""Values of kinds that no reader asks for."""
+
+
+@pytest.mark.skipif(not HAS_USD, reason="usd-core is not installed")
+def test_account_of_usd_adds_up(tmp_path):
+    for seed in range(MODELS):
+        text = next(iter(FORMATS["USD"](random_robot(seed)).values()))
+        more = "".join(f"{kind} acme:{kind[0]} = {value}\n" for kind, value in ODD.items())
+        for planted in ("", more, "float physics:mass = 2\n"):
+            *_, head = re.finditer(r"def Xform \"a0\"[^{]*\{\n", text)
+            said = text[: head.end()] + planted + text[head.end() :]
+            account = read_tree(written(tmp_path, {"usda": said})).account
+            assert account.read + account.left == contents_of_usd(said)
+            assert account.read > account.left
+
+
 @pytest.mark.skipif(not HAS_USD, reason="usd-core is not installed")
 def test_planted_usd_is_named(tmp_path):
     text = next(iter(FORMATS["USD"](random_robot(0)).values()))
@@ -159,6 +186,8 @@ def test_planted_usd_is_named(tmp_path):
         for line, always in (
             (f"float physics:{NAME} = 1", True),
             (f"float acme:{NAME} = 1", moves),
+            (f"float2 physics:{NAME} = (1, 2)", True),
+            (f'token[] acme:{NAME} = ["a"]', moves),
             (f'def Physics{NAME} "p" {{}}', True),
             (f'def {NAME} "p" {{}}', True),
         ):

@@ -6,9 +6,9 @@ import numpy as np
 
 from ....case.case import Case
 from ....case.measures import DriverEffort
-from ....kinematics import StaticModel
 from ...compliance.rig import CONTACT
 from ...compliance.study import compliance
+from ...statics.equilibrium import StaticModel
 from .rounds import Spread, Work, take_turns
 
 TRAVEL, LATERAL = 0.04, 2000.0

@@ -25,7 +25,7 @@ from ....errors import KincheckError, SolveError
 from ....harness.compare import output_series
 from ....harness.labels import motion_unit
 from ....joints import Kind
-from ....kinematics import Style, solve
+from ....kinematics import solve, styles
 from ....mechanism.mechanism import Mechanism, Vector
 from ....primitives import Pose, Twist
 from ....primitives.base import map_numbers
@@ -141,7 +141,8 @@ def measure_roundoff(seed: int, states: int) -> list[RoundOff]:
                 )
                 for rows, style, equations in _ways_to_write(known.conditions[number]):
                     j = replace(known.j, u=known.e0 + known.j.u) if style == "printed" else known.j
-                    errors = _errors_of(equations, known.i, j, mpmath.mpf)
+                    axes = style != "native"
+                    errors = _errors_of(equations, known.i, j, mpmath.mpf, body_axes=axes)
                     far = distance if name in ("d20", "d21") else None
                     found.append(RoundOff(name, rows, WAYS[style], far, *errors))
     return found
@@ -157,11 +158,16 @@ def _ways_to_write(condition: Condition) -> Iterator[tuple[str, str, Sequence[An
 
 
 def _errors_of(
-    equations: Sequence[Any], i: Moving, j: Moving, exact: Callable[[Any], Any]
+    equations: Sequence[Any],
+    i: Moving,
+    j: Moving,
+    exact: Callable[[Any], Any],
+    *,
+    body_axes: bool,
 ) -> list[Error]:
     """Return the errors of residual, Jacobian and gamma."""
     to_exact = cast("Callable[[Any], Any]", np.frompyfunc(exact, 1, 1))
-    motions = [each.motion(equations[0].body_axes) for each in (i, j)]
+    motions = [each.motion(body_axes) for each in (i, j)]
     rounded = _values(equations, (i, j), motions)
     exactly = _values(*(map_numbers(each, to_exact) for each in (list(equations), [i, j], motions)))
     found: list[Error] = []
@@ -315,7 +321,7 @@ def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
     places = {AT_DESIGN: case.mechanism, AWAY: away, BACK: back}
     programs: list[ProgramSize] = []
     sweeps: list[SweepError] = []
-    for style in Style:
+    for style in styles():
         found = {place: _solve_sweep(case, mechanism, style) for place, mechanism in places.items()}
         # where positions alone are asked for, rates are a program of their own: it is run where the
         # motion begins
@@ -326,7 +332,7 @@ def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
             order=0,
             style=style,
         ).details["program"]
-        programs.append(ProgramSize(style.value, size["newton"]["flops"], size["tangent"]["flops"]))
+        programs.append(ProgramSize(style, size["newton"]["flops"], size["tangent"]["flops"]))
         outputs = {
             place: _outputs(replace(case, mechanism=places[place]), each)
             for place, each in found.items()
@@ -341,7 +347,7 @@ def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
         errors[DIFFERENCE] = outputs[AWAY] - outputs[BACK]
         for place, each in errors.items():
             largest = np.abs(each).max(axis=(0, 2)).tolist()
-            sweeps.append(SweepError(style.value, place, *largest))
+            sweeps.append(SweepError(style, place, *largest))
     return programs, sweeps
 
 

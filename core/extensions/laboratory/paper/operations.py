@@ -33,13 +33,14 @@ from dataclasses import dataclass
 from functools import reduce
 from itertools import count, pairwise
 from operator import add
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import msgspec
 
 from ....algebra import IDENTITY, ZERO, Mat3, Scalar, Vec3, X, Y, Z
 from ....primitives import Dot10, Dot11, Dot12, Dot20, Dot21, Pose, Primitive, Row, Twist
 from ....program import Tape, program
+from .rows import conventional_form, paper_form
 
 
 class Countable(Protocol):
@@ -75,7 +76,6 @@ class AsPrinted:
             A_j.
     """
 
-    body_axes: ClassVar[bool] = True
     formed: bool = True
 
     def relative(self, i: Pose, j: Pose) -> tuple[Mat3, ...]:
@@ -240,7 +240,7 @@ class Condition:
 
     def simplified_rows(self, style: str) -> tuple[Primitive, ...]:
         """Return the condition in the row style "native" or "paper"."""
-        return (self.primitive,) if style == "native" else self.primitive.paper_form()
+        return (self.primitive,) if style == "native" else paper_form(self.primitive)
 
     def unsimplified_rows(self, style: str) -> tuple[Primitive, ...]:
         """Return the scalar products in the row style "native", "paper" or "conventional"."""
@@ -249,7 +249,7 @@ class Condition:
         return tuple(
             form
             for dot in self.dots
-            for form in (dot.paper_form() if style == "paper" else dot.conventional_form())
+            for form in (paper_form(dot) if style == "paper" else conventional_form(dot))
         )
 
     def printed_rows(self, *, formed: bool) -> tuple[PrintedDot10 | PrintedDot20, ...]:

@@ -1,0 +1,178 @@
+"""kincheck fit: the table that a rig measured, and what the rig determines of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO, cast
+
+import numpy as np
+
+from ...case.io.reader_options import CurveOptions
+from ...cli.registry import Registry, Status
+from ...cli.shared_options import OfCase
+from ...errors import refuse
+from ...options import destination, group, json_file, option, options
+from .new_table import require_new, table_of, write_new
+
+if TYPE_CHECKING:
+    from ...case.case import Case
+    from ...trajectory import Array
+    from .fit import Fitted, Shift
+
+DRAWING = "+- 2 mm"
+
+
+@options
+class Fit(OfCase):
+    """Fit a table of hardpoints to curves that a rig measured, and say what the rig determines.
+
+    The fit is the most likely table, by the noise of the rig and the deviation of the drawing. All
+    intervals are of 95 %. Exit status: 0 the table fits, even if slips of the file fit as well;
+    1 it does not fit, and nothing is written; 2 the tool could not do its work.
+    """
+
+    about = "hardpoint table: fit it to measured curves, with what they determine"
+    measured: Path = option(
+        "measured curves: CSV, text or .xlsx, with a column of the travel and outputs by the names"
+        " of kincheck run or of rigs",
+        Path,
+        "RIG",
+        required=True,
+    )
+    move: tuple[str, ...] = option(
+        'points that may be off, with or without a deviation of their own: "tierod_inner: y z",'
+        ' "lca_outer: +- 0.5 mm"; may be repeated; default: all points',
+        metavar="MOVE",
+        several="repeated",
+    )
+    drawing: str = option(
+        "standard deviation of a coordinate from the drawing; default: %(default)s",
+        metavar="LENGTH",
+        default=DRAWING,
+    )
+    free: tuple[str, ...] = option(
+        'zero or scale that the rig does not know: "toe zero", "camber scale", "travel zero"; may'
+        " be repeated",
+        metavar="NAME",
+        several="repeated",
+    )
+    out: Path | None = destination("write the fitted table, as CSV", Path)
+    page: Path | None = destination("write a page with residuals, moves and combinations", Path)
+    json: str | None = json_file("the answer")
+    curve: CurveOptions = group(default_factory=CurveOptions)
+
+    def answer(self, registry: Registry) -> Fitted:
+        """Fit a table of hardpoints to curves that a rig measured.
+
+        Raises:
+            KincheckError: a file or an option makes no sense, or the table does not reach the
+                travel of the rig.
+        """
+        return self._fitted(table_of(self, registry)[0])
+
+    def _fitted(self, case: Case) -> Fitted:
+        from .fit import fit
+
+        return fit(case, Path(self.measured), self.curve, self.drawing, self.move, self.free)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ...case.io.atomic_files import write
+        from ...report.sections import print_report
+        from ...report.terminal import with_json
+        from .fit import Verdict
+        from .fit_views import page, report
+
+        require_new(self.out)
+        refuse(self.unwritable())
+        case, file = table_of(self, registry)
+        found = self._fitted(case)
+        fits, checked = found.verdict is not Verdict.OFF, None
+        if fits and self.out is not None:
+            checked = write_new(self.out, case, file, self.supplied, found.moves, registry)
+        if self.page is not None:
+            write("--page", self.page, page(found).encode())
+        with with_json(facts(found, self.out if fits else None, checked), self.json) as console:
+            print_report(report(found), cast(TextIO, console.file))
+            if fits and self.out is not None:
+                by = f"solved again by {checked}" if checked else "no other engine is installed"
+                print(f"\n{self.out}: written, {by}", file=console.file)
+        return Status.WITHIN if fits else Status.DEVIATES
+
+
+def facts(found: Fitted, out: Path | None = None, checked: str | None = None) -> dict[str, Any]:
+    """Return the answer as plain data [SI], with standard deviations."""
+    from .fit import NORMAL
+    from .identify import source
+
+    def interval(value: float, deviation: float) -> dict[str, Any]:
+        half = NORMAL * deviation
+        return {"value": value, "deviation": deviation, "interval": [value - half, value + half]}
+
+    def shifted(each: Shift) -> dict[str, Any]:
+        about = {"name": each.name, "unit": each.si, "p": each.chance}
+        return about | (interval(each.size, each.deviation) if np.isfinite(each.deviation) else {})
+
+    rig, deviations = found.rig, found.deviations
+    return {
+        "schema": "kincheck-fit/1",
+        "case": rig.case.name,
+        "verdict": str(found.verdict),
+        "probability": found.first.probability,
+        "misfit": found.first.misfit,
+        "numbers": rig.count,
+        "noise": {
+            goal.output: {"deviation": float(np.median(noise)), "source": what}
+            for goal, noise, what in zip(rig.goals, rig.noise, rig.sources, strict=True)
+        },
+        "directions": [
+            {
+                "terms": each.terms,
+                **interval(each.value, each.deviation),
+                "drawing": each.drawing,
+                "from": each.source,
+            }
+            for each in found.combinations
+        ],
+        "null": len(found.null),
+        "null_directions": found.null,
+        "predictions": {
+            name: {
+                "travel": rig.case.sweep.values.tolist(),
+                "value": _plain(each.values),
+                "deviation": _plain(each.spread),
+                "low": _plain(each.values - NORMAL * each.spread),
+                "high": _plain(each.values + NORMAL * each.spread),
+                "drawing": _plain(each.drawing),
+                "from": each.source,
+            }
+            for name, each in found.predictions.items()
+        },
+        "coordinates": {
+            place: {
+                **interval(move, deviations[place]),
+                "drawing": found.boxes[place],
+                "from": source(deviations[place], found.boxes[place]),
+            }
+            for place, move in found.moves.items()
+        },
+        "moves_m": found.moves,
+        "without_effect": found.idle,
+        "offsets": [*map(shifted, found.shifts)],
+        "slips": [
+            *map(shifted, found.found),
+            *(
+                {"name": each.name, "p": each.chance, "largest_move": each.largest}
+                for each in found.slips
+            ),
+            *map(shifted, found.loose),
+        ],
+        "off_at": found.worst,
+        "checked_by": checked,
+        "file": str(out) if out is not None else None,
+    }
+
+
+def _plain(values: Array) -> list[float | None]:
+    """Return numbers, None for those that are unknown."""
+    return [x if np.isfinite(x) else None for x in values.tolist()]

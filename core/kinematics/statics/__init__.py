@@ -1,1 +1,0 @@
-"""Statics: equilibria of mechanisms with springs, bushings and loads, and their compliance."""

@@ -1,0 +1,111 @@
+"""A history of thousands of runs, and what `report` and `history` take on it.
+
+    python -m tests.history.long_history FILE [RUNS]
+
+Three nights are stored and judged as every night is. The other runs are copies of the last one,
+with noise in their times, written as rows.
+"""
+
+import json
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import kincheck
+from kincheck.core.history.judging import judge_runs
+from kincheck.core.history.store import Store
+from msgspec.structs import replace
+
+from ..support.history_runs import FACTS
+
+CASES = ["five_bar", "rssr", "mcpherson_strut"]
+ENGINES = {"native": "0.3.0", "mujoco": "4.0.0", "pinocchio": "4.1.0"}
+SECONDS, MEGABYTES = 1.0, 150
+"""What a report, and a list of the runs, may take: of a processor, and of memory."""
+
+
+def make(path, runs):
+    """Write a history of so many runs of nine pairs: three cases of the library in three engines.
+
+    The results are those of the native engine, under three names.
+    """
+    found = kincheck.run(CASES, ["native"], jobs=0)
+    records = [
+        replace(each, engine=engine, version=version)
+        for each in found.records
+        for engine, version in ENGINES.items()
+    ]
+    facts = {**found.run, **FACTS, "command": "kincheck run", "calibration_seconds": 0.02}
+    with Store(path) as store:
+        for day in range(3):
+            known = {**facts, "started": f"2000-01-0{day + 1}T03:00:00+00:00"}
+            run = store.begin_run("same", [each.pair for each in records], known)
+            for record in records:
+                store.add_record(run, record)
+            store.finish(run, replace(found, run=known, records=records))
+        judge_runs(store)
+        with store.transaction():
+            _copy(store.connection, run, runs - run)
+
+
+def _copy(connection, run, count):
+    """Add copies of a run, each a day later, with noise of a tenth in its times."""
+    noise = random.Random(1)
+    later = [(run + day, f"+{day} days") for day in range(1, count + 1)]
+    columns = "finished, status, command, identity, owner, plan, circumstances"
+    started = "strftime('%Y-%m-%dT%H:%M:%S+00:00', started, ?)"
+    connection.executemany(
+        f"INSERT INTO runs SELECT ?, {started}, {columns} FROM runs WHERE id = {run}", later
+    )
+    for table, names in _tables(connection):
+        values = ", ".join(
+            "? * warm_seconds" if name == "warm_seconds" else ("?" if name in RUNS else name)
+            for name in names
+        )
+        given = [
+            [factor if name == "warm_seconds" else number for name in names if name in CHANGED]
+            for number, _ in later
+            for factor in (noise.uniform(0.9, 1.1),)
+        ]
+        connection.executemany(
+            f"INSERT INTO {table} SELECT {values} FROM {table} WHERE run_id = {run}", given
+        )
+
+
+RUNS = "run_id", "base_run"
+CHANGED = (*RUNS, "warm_seconds")
+"""Columns of copies that differ."""
+
+
+def _tables(connection):
+    """The tables with a row of a run for each pair or case, and their columns."""
+    for table in ("records", "attachments", "states"):
+        rows = connection.execute(f"PRAGMA table_info({table})")
+        yield table, [name for _, name, *_ in rows]
+
+
+def cost(*words):
+    """Status, processor time [s], memory [MB] and output of a command."""
+    script = (
+        "import resource, subprocess, sys\n"
+        "done = subprocess.run(sys.argv[1:], capture_output=True, text=True)\n"
+        "used = resource.getrusage(resource.RUSAGE_CHILDREN)\n"
+        "import json\n"
+        "print(json.dumps([done.returncode, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024,"
+        " done.stdout + done.stderr]))\n"
+    )
+    command = [sys.executable, "-m", "kincheck", *map(str, words)]
+    return json.loads(subprocess.check_output([sys.executable, "-c", script, *command], text=True))
+
+
+if __name__ == "__main__":
+    file, count = Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 10_000
+    if not file.exists():
+        make(file, count)
+    print(f"{file.stat().st_size / 1e6:.0f} MB")
+    for words in (("report",), ("history",), ("history", "--case", "rssr"), ("--version",)):
+        history = () if words == ("--version",) else ("--history", file)
+        status, seconds, megabytes, said = cost(*words, *history)
+        print(f"{' '.join(words)}: status {status}, {seconds:.2f} s, {megabytes:.0f} MB")
+        print(said[:300])
