@@ -31,7 +31,7 @@ def template_of(table: HardpointTable, supplied: WheelOptions) -> tuple[Template
     fill by their names, with a note.
 
     Raises:
-        CaseError: there is no such template, two are stated, or nothing tells which it is.
+        CaseError: there is no such template, two are stated, or it stays open.
     """
     if (stated := stated_template(table, supplied)) is not None:
         return stated, []
@@ -147,11 +147,11 @@ def fill_roles(
 def _by_names(
     table: HardpointTable, template: Template, supplied: WheelOptions, given: Mapping[str, str]
 ) -> tuple[dict[str, str], list[str], dict[str, str]]:
-    """Return the points of roles by their names, the roles among them that only words tell, and for
-    each needed role without a point the name most like it, if there is one.
+    """Return the points of roles by their names, the roles among them by words alone, and for each
+    needed role without a point the name most like it, if there is one.
 
     Args:
-        given: points of roles that are known otherwise.
+        given: points of roles known otherwise.
 
     Raises:
         CaseError: two points have names of one role.
@@ -192,8 +192,8 @@ _Names: TypeAlias = Callable[[Role], list[str]]
 
 
 def _points_by_role(table: HardpointTable) -> tuple[_Names, _Names]:
-    """Return what gives the points with a name of a role, or else with one and their side; and what
-    gives those whose names say it in other words.
+    """Return the functions from a role to the points with one of its names, or else with one and
+    their side; and to those with a name in other words.
     """
     by_compact_name = dict[str, list[str]]()
     by_side_name = dict[str, list[str]]()

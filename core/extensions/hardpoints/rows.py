@@ -223,7 +223,7 @@ def _join_words(words: Sequence[Cell]) -> Sequence[Cell]:
 
 
 def _with_names(rows: Sequence[Row]) -> Iterator[Row]:
-    """Yield rows between blanks; a head x, y, z may stand above rows that begin with names."""
+    """Yield rows between blanks; a head x, y, z may stand above rows with names first."""
     for k, (where, cells) in enumerate(rows):
         after = rows[k + 1][1] if k + 1 < len(rows) else ()
         three = [_column(str(cell))[0] for cell in cells] == ["x", "y", "z"]

@@ -133,8 +133,7 @@ def explain_slips(
     most = list(known.items())[:_NAMED]
     sentences = [
         f"{shortened([name for name, _ in names], _NAMED)}: the recording {words} leaves"
-        f" {names[0][1]}"
-        + f". If it is meant, say {' '.join(maps[words])}" * bool(maps[words])
+        f" {names[0][1]}" + f". If it is meant, say {' '.join(maps[words])}" * bool(maps[words])
         for words, names in most
     ]
     all_known = sum(map(len, known.values())) == len(off)
