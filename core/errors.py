@@ -86,12 +86,12 @@ class CaseError(KincheckError, ValueError):
 
 
 class OpenError(CaseError):
-    """A file leaves facts open that options of its reader state.
+    """A file leaves facts open, and options of its reader state them.
 
     Attributes:
         why: the guess of each option, and why, a line each.
         stated: the guess by the options' fields; reading goes on with it.
-        writes: texts of new files that the options name.
+        writes: texts of new files, named by the options.
     """
 
     def __init__(

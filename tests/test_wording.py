@@ -4,6 +4,8 @@ import ast
 import re
 from collections import Counter
 
+import pytest
+
 from .support.sources import SOURCES, statements, tree
 
 MOST = 12.0
@@ -36,3 +38,53 @@ def test_heavy_words_are_counted():
 
 def test_docstrings_are_plain():
     assert {folder: share for folder, share in shares().items() if share > MOST} == {}
+
+
+CHAINED = re.compile(r"; ?[\w{\"'-]")
+"""A clause that a message chains to another."""
+MOST_CHAINED = {
+    "core/extensions/hardpoints": 18,
+    "core/extensions/recorded": 24,
+    "core/history": 8,
+    "core/extensions/compliance": 22,
+    "core/case": 181,
+    "core/extensions/trees": 135,
+}
+"""Texts with chained clauses, helps and remarks among them; a number here only falls."""
+
+
+def chained(folder):
+    """The texts of a folder that chain clauses, but for docstrings."""
+    found = []
+    for path in SOURCES:
+        if folder not in map(str, path.parents):
+            continue
+        for node in ast.walk(tree(path)):
+            for child in ast.iter_child_nodes(node):
+                if isinstance(node, ast.Expr | ast.JoinedStr) or not is_text(child):
+                    continue
+                text = words_of(child)
+                if CHAINED.search(text) and len(text.split()) > 3:
+                    found.append(text)
+    return found
+
+
+def is_text(node):
+    return isinstance(node, ast.JoinedStr) or (
+        isinstance(node, ast.Constant) and isinstance(node.value, str)
+    )
+
+
+def words_of(node):
+    parts = node.values if isinstance(node, ast.JoinedStr) else [node]
+    return "".join(each.value if isinstance(each, ast.Constant) else "{}" for each in parts)
+
+
+@pytest.mark.parametrize("folder", MOST_CHAINED)
+def test_messages_are_short_sentences(folder):
+    assert len(chained(folder)) <= MOST_CHAINED[folder], chained(folder)
+
+
+def test_chained_clauses_are_counted():
+    (node,) = ast.parse('f"found {x}, expected two numbers; write them"').body
+    assert CHAINED.search(words_of(node.value))

@@ -41,6 +41,9 @@ class Parser(argparse.ArgumentParser):
             name = word.partition("=")[0] if word.startswith("--") else word[:2]
             if name not in known and not any(each.startswith(name) for each in known):
                 self.error(f"there is no option {brief(name)!r}{self._remedy(name)}")
+        if args and not args[0].startswith("-") and not self._get_positional_actions():
+            close = f"; say --case {brief(args[0])}" if "--case" in known else "; leave it out"
+            self.error(f"{brief(args[0])!r} stands without an option{close}")
         namespace, others = super().parse_known_args(args, namespace)
         rest = [each for each in self._get_positional_actions() if each.nargs == "*"]
         if others and rest:  # argparse takes those before the first option alone

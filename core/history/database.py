@@ -189,7 +189,7 @@ def require_sound(connection: sqlite3.Connection) -> None:
     """
     (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if found != "ok":
-        raise ValueError(f"it is damaged ({found.splitlines()[-1]}); restore a copy")
+        raise ValueError(f"it is damaged ({found.splitlines()[-1]}). Restore a copy")
 
 
 def write_ahead(connection: sqlite3.Connection, patience: float) -> None:
@@ -262,7 +262,7 @@ def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
         if run is not None and _is_damaged(error):
             raise DamagedRunError(
                 run,
-                f"history {path}: run {run} cannot be {what} ({shorten_text(error)}); it may be damaged:"
+                f"history {path}: run {run} cannot be {what} ({shorten_text(error)}). It may be damaged:"
                 " restore a copy of the file, or remove the run: kincheck history --history"
                 f" {shlex.quote(str(path))} --remove {run}",
             ) from error

@@ -97,7 +97,7 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
         known = sorted({str(row.git["branch"]) for row in store.runs() if row.git.get("branch")})
         return None, (
             f"no earlier run of branch {name.removesuffix(BASELINE)!r}, without changes to its"
-            " files, with any of its pairs; the history has"
+            " files, with any of its pairs. The history has"
             f" {'branches ' + ', '.join(known) if known else 'no branch'}"
         )
     against = find(name, store)
@@ -214,7 +214,7 @@ class Keeping:
             self.store.add_record(self.run, record)
         except HistoryError as error:
             self.problems.append(
-                f"{error}; the records before {record.case} {record.engine} are stored as run"
+                f"{error}. The records before {record.case} {record.engine} are stored as run"
                 f" {self.run}"
             )
 
@@ -225,7 +225,7 @@ class Keeping:
                 self.store.finish(self.run, results, "interrupted" if interrupted else "finished")
             except HistoryError as error:
                 self.problems.append(
-                    f"{error}; all records are stored, but run {self.run} has no end; --resume"
+                    f"{error}. All records are stored, but run {self.run} has no end; --resume"
                     " gives it one"
                 )
             else:
@@ -236,7 +236,7 @@ class Keeping:
         try:
             judge_runs(self.store)
         except HistoryError as error:
-            self.problems.append(f"{error}; run {self.run} is stored, and its report judges it")
+            self.problems.append(f"{error}. Run {self.run} is stored, and its report judges it")
 
 
 def keep(

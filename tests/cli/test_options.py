@@ -144,7 +144,7 @@ def test_shared_output_file_is_refused(line, option, other, here, capsys):
     (said,) = err.splitlines()
     assert out == ""
     assert said.startswith(f"kincheck: {option} ")
-    assert said.endswith(f": found the file of {other}, expected one of its own; give another")
+    assert said.endswith(f": found the file of {other}, expected one of its own. Give another")
     assert (here / "a").read_text() == "here before"
     assert not [*(here / "no").iterdir()]
 

@@ -82,7 +82,7 @@ def test_file_behind_standard_output_is_refused(tmp_path):
         assert done.returncode == 2
         expected = (
             f"kincheck: --junit {name}: found the file that standard output goes to, expected one"
-            " of its own; give another\n"
+            " of its own. Give another\n"
         )
         assert done.stderr.decode() == expected
     # a pipe takes both

@@ -86,7 +86,7 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
                 "--travel",
                 f"found {shown(travel)}, expected a length such as 50mm, or LENGTH:SAMPLES, 2 to"
                 f" {MOST_SAMPLES} of them, or START:STOP:SAMPLES, up to {FARTHEST:g} m, in metres"
-                " unless a unit is given; say --travel 50mm for 50 mm up and down",
+                " unless a unit is given. Say --travel 50mm for 50 mm up and down",
             )
         wheel = ends
     ends = None if rack is None else _interval(rack.split(":"))
@@ -95,7 +95,7 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
             file,
             "--rack",
             f"found {shown(rack)}, expected a length such as 40mm, or START:STOP, up to"
-            f" {FARTHEST:g} m, in metres unless a unit is given; say --rack 40mm for 40 mm to the"
+            f" {FARTHEST:g} m, in metres unless a unit is given. Say --rack 40mm for 40 mm to the"
             " right, then to the left",
         )
     return Travels(np.linspace(*wheel, samples), ends)
@@ -164,10 +164,10 @@ def mechanism_of(
             ("--axle", said, "heave or roll") if steering else ("--rack", "a travel", "none")
         )
         problem = f"found {what}, but template {template.name} has no tie rod"
-        raise fault(file, option, f"{problem}, expected {expected}; leave out the steering")
+        raise fault(file, option, f"{problem}, expected {expected}. Leave out the steering")
     if steering and travels.rack is not None:
         problem = "found it beside --axle steer, whose --travel is that of the rack"
-        raise fault(file, "--rack", f"{problem}, expected one of them; leave it out")
+        raise fault(file, "--rack", f"{problem}, expected one of them. Leave it out")
     racked = bool(template.steered) and (said is not None or travels.rack is not None)
     sides = sides_of(said, side)
     joints = list[Joint]()
@@ -237,15 +237,15 @@ def vehicle_of(
         raise fault(
             file,
             named[WHEEL_AXIS],
-            f"found a point inboard of {named[WHEEL_CENTER]}, expected one outboard;"
-            " mirror it at the wheel's centre",
+            f"found a point inboard of {named[WHEEL_CENTER]}, expected one outboard."
+            " Mirror it at the wheel's centre",
         )
     if contact is not None and radius is not None:
         raise fault(
             file,
             "--wheel-radius",
-            f"found {radius}, and the point {named[WHEEL_CONTACT]}, expected one of them;"
-            " leave out --wheel-radius",
+            f"found {radius}, and the point {named[WHEEL_CONTACT]}, expected one of them."
+            " Leave out --wheel-radius",
         )
     size = math.dist(center, contact) if contact else _length(file, "wheel-radius", radius, RADII)
     if contact is not None:
@@ -283,7 +283,7 @@ def _length(file: Path, option: str, text: str | None, limits: tuple[float, floa
         raise fault(
             file,
             f"--{option}",
-            f"found {shown(text)}, expected a length; say --{option} 0.3 or 300mm",
+            f"found {shown(text)}, expected a length. Say --{option} 0.3 or 300mm",
         ) from None
     _require_within(file, f"--{option}", found, limits)
     return found
@@ -296,7 +296,7 @@ def _require_within(
     if size is not None and not least <= size <= most:
         unit = f", or say its unit: {size:.6g}mm" if least <= 1e-3 * size <= most else ""
         problem = f"found {size:.6g} m, expected a length of {least:g} to {most:g} m"
-        raise fault(file, where, f"{problem}; correct it{unit}")
+        raise fault(file, where, f"{problem}. Correct it{unit}")
 
 
 def _share(file: Path, option: str, text: str | None) -> float | None:
@@ -310,7 +310,7 @@ def _share(file: Path, option: str, text: str | None) -> float | None:
         raise fault(
             file,
             f"--{option}",
-            f"found {shown(text)}, expected the part of a force, 0 to 1; say --{option} 0.6",
+            f"found {shown(text)}, expected the part of a force, 0 to 1. Say --{option} 0.6",
         )
     return found
 

@@ -1,5 +1,5 @@
-"""Roles of unnamed points by geometry: the assignment to a template's roles that is most like its
-sample, over all axes that a table may have.
+"""Roles of unnamed points by geometry: the assignment to a template's roles most like its
+sample, over all possible axes of a table.
 
 A sample is scaled to the wheel's distance from the middle. Places are compared with it, and then
 directions: of rods, arms, pivots and the steering axis. Steering may be ahead of the wheel or
@@ -55,7 +55,7 @@ class Fit:
 
 
 def every_axes(right_handed: bool = True) -> list[str]:
-    """Return the axes that a table may have, usual ones first."""
+    """Return all possible axes of a table, usual ones first."""
     found = list[str]()
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1, -1), repeat=3):
@@ -229,7 +229,7 @@ class _Start:
         )
 
     def improved(self, chosen: Indices) -> tuple[Indices, float]:
-        """Return the assignment after all exchanges that lower its cost, and the cost."""
+        """Return the assignment after all exchanges with a lower cost, and the cost."""
         roles, needed = self.sample.roles, self.sample.needed
         best, free = (
             self.cost(chosen),

@@ -1,5 +1,5 @@
-"""One question about all that a table leaves open: unit, axes, template, side, radius and names of
-points, each guessed from what the table says and from its geometry.
+"""One question about all open facts of a table: unit, axes, template, side, radius and names of
+points, each guessed from texts of the table and from its geometry.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def guess_of(
     supplied: WheelOptions,
     case_of: Callable[[HardpointTable, WheelOptions], object],
 ) -> Guess | None:
-    """Return a guess of what is open that can be solved; None if nothing is open, or no guess is
+    """Return a guess of the open facts, after a trial; None if nothing is open, or no guess is
     like a suspension.
 
     Args:
@@ -98,7 +98,7 @@ def _likely(
     templates: Sequence[Template],
     known: Mapping[str, Mapping[str, str]],
 ) -> list[tuple[Fit, list[str]]]:
-    """Return the likely assignments, the best first, each with what is doubtful about it."""
+    """Return the likely assignments, the best first, each with its doubts."""
     from .fitting import WORDS, every_axes, fits  # slow
 
     side = supplied.side or table.side
@@ -167,14 +167,14 @@ def _side(points: Mapping[str, Sequence[float]], fit: Fit) -> str:
 
 
 class Guess:
-    """A guess of what is open.
+    """A guess of the open facts.
 
     Attributes:
         stated: the guess by the options' fields.
         why: a line for each.
         taken: the user's options with the guess, but for the names.
         fit: template, axes and roles.
-        doubts: what may be otherwise.
+        doubts: possible mistakes.
     """
 
     def __init__(
@@ -234,7 +234,7 @@ class Guess:
         self._say("units", unit, text)
 
     def _why_axes(self) -> str:
-        """Return what tells the axes."""
+        """Return the reason for the axes."""
         said = first_said(axes_said, self.table.texts)
         if said == self.fit.axes:
             return "a text of the file says so"

@@ -197,7 +197,7 @@ def read_adams(file: Path, text: str) -> HardpointTable:
                 raise fault(
                     file,
                     where,
-                    f"found the columns {shown(row)}, expected {{{' '.join(COLUMNS)}}}; correct"
+                    f"found the columns {shown(row)}, expected {{{' '.join(COLUMNS)}}}. Correct"
                     " them",
                 )
         elif section == "HARDPOINT":
@@ -214,7 +214,7 @@ def read_adams(file: Path, text: str) -> HardpointTable:
         raise fault(
             file,
             "",
-            f"found no row in a block {BLOCK}, expected hardpoints; give a subsystem file of"
+            f"found no row in a block {BLOCK}, expected hardpoints. Give a subsystem file of"
             " Adams/Car",
         )
     left_out = [
@@ -234,7 +234,7 @@ def _row(file: Path, where: str, row: str, columns: tuple[str, ...]) -> tuple[st
         raise fault(
             file,
             where,
-            f"found {len(fields)} fields, expected {len(columns)}: {' '.join(columns)}; complete"
+            f"found {len(fields)} fields, expected {len(columns)}: {' '.join(columns)}. Complete"
             " the row",
         )
     cells = dict(zip(columns, fields, strict=True))
@@ -307,14 +307,14 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
         raise fault(
             file,
             "Type",
-            f'found {shown(kind)}, expected "Suspension"; give the JSON file of a suspension',
+            f'found {shown(kind)}, expected "Suspension". Give the JSON file of a suspension',
         )
     template = tables.get("Template")
     if template is not None and not isinstance(template, str):
         raise fault(
             file,
             "Template",
-            f"found {shown(template)}, expected the name of a suspension template; correct the"
+            f"found {shown(template)}, expected the name of a suspension template. Correct the"
             " value",
         )
     points = dict[str, Hardpoint]()
@@ -344,7 +344,7 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
         raise fault(
             file,
             "",
-            'found no key "Location ...", expected the points of a suspension; give a suspension'
+            'found no key "Location ...", expected the points of a suspension. Give a suspension'
             " file of Chrono",
         )
     return HardpointTable(
@@ -366,7 +366,7 @@ def _point(file: Path, key: str, value: object) -> tuple[float, float, float]:
         raise fault(
             file,
             key,
-            f"found {shown(cast('object', value))}, expected three numbers [x, y, z]; correct the"
+            f"found {shown(cast('object', value))}, expected three numbers [x, y, z]. Correct the"
             " point",
         )
     x, y, z = (number(file, key, each) for each in numbers)
@@ -411,10 +411,10 @@ def read_assetto(file: Path, text: str, supplied: WheelOptions) -> HardpointTabl
     chosen = [name for name in axles if wanted.upper() in ("", name)]
     if len(chosen) != 1:
         found = f"found points of {', '.join(axles)}"
-        raise fault(file, "", f"{found}, expected those of one axle; choose it by --sheet FRONT")
+        raise fault(file, "", f"{found}, expected those of one axle. Choose it by --sheet FRONT")
     keys = sections[chosen[0]]
     if "TRACK" not in keys:
-        raise fault(file, chosen[0], "found no TRACK, expected it beside the points; add it")
+        raise fault(file, chosen[0], "found no TRACK, expected it beside the points. Add it")
     half = 0.5 * number(file, keys["TRACK"][0], keys["TRACK"][1])
     outward = -1.0 if corner and corner[1] == "right" else 1.0
     points = {"wheel_center": Hardpoint((0.0, outward * half, 0.0), keys["TRACK"][0])}

@@ -77,8 +77,8 @@ def case_of_hardpoints(
         raise fault(
             file,
             "",
-            f"found {len(table.points)} points, expected a suspension's, {MOST_POINTS} at most;"
-            " take out the others",
+            f"found {len(table.points)} points, expected a suspension's, {MOST_POINTS} at most."
+            " Take out the others",
         )
     table = _of_corner(table, supplied.corner)
     if guess := guess_of(table, supplied, case_of_hardpoints):
@@ -92,7 +92,7 @@ def case_of_hardpoints(
     size = max(math.dist(a, b) for a in at.values() for b in at.values())
     if improbable := SUSPENSIONS.improbable(size, unit):
         problem = f"the points span {improbable} They are in another unit"
-        raise fault(file, "", f"{problem}; correct --units, or the unit in the file")
+        raise fault(file, "", f"{problem}. Correct --units, or the unit in the file")
     side, of_side = _side(table, named[WHEEL_CENTER], axes, supplied)
     if side is Side.RIGHT:  # a template describes the left side
         axes = [(k, -sign if k == 1 else sign) for k, sign in axes]
@@ -191,14 +191,14 @@ def _side(
             raise unknown_name(table.file, where, text, [*Side], "a side")
     stated = {where: Side(text.strip().lower()) for where, text in said.items() if text}
     number = f"{'xyz'[column]} = {plain(y)} {unit_of(table, supplied.units).name}"
-    correct = "correct --axes" if table.axes is None else "correct the points"
+    correct = "Correct --axes" if table.axes is None else "Correct the points"
     if len({*stated.values()}) > 1:
         problem = f"found {supplied.side}, but the points of this file are of the {table.side} side"
-        raise fault(table.file, "--side", f"{problem}; leave out --side")
+        raise fault(table.file, "--side", f"{problem}. Leave out --side")
     for where, side in stated.items():
         if side is not found or y == 0.0:
             problem = f"found {number}, not {side} of the middle, but {where} says {side}"
-            raise fault(table.file, center, f"{problem}, expected the same; {correct}, or the side")
+            raise fault(table.file, center, f"{problem}, expected the same. {correct}, or the side")
     turned = np.zeros((3, 3))
     for row, (k, way) in enumerate(axes):
         turned[row, k] = way
@@ -206,12 +206,12 @@ def _side(
         problem = f"found {number}, not left of the middle, expected the left side"
         why = "" if y == 0.0 else " in left-handed axes"
         raise fault(
-            table.file, center, f"{problem}{why}; {correct}, or say --side right for a right wheel"
+            table.file, center, f"{problem}{why}. {correct}, or say --side right for a right wheel"
         )
     if stated or found is Side.LEFT:
         return found, []
     note = f"{center} has {number}, right of the middle: read as a right wheel"
-    return found, [f"{note}; --side right, or a line # side: right, states it"]
+    return found, [f"{note}. --side right, or a line # side: right, states it"]
 
 
 def _of_corner(table: HardpointTable, said: str | None) -> HardpointTable:
@@ -225,7 +225,7 @@ def _of_corner(table: HardpointTable, said: str | None) -> HardpointTable:
             table.file,
             "--corner",
             f"found no point of {said}, expected a column, sheet, section or names that tell"
-            " corners apart; leave out --corner for a table of one wheel",
+            " corners apart. Leave out --corner for a table of one wheel",
         )
     kept = {name: each for name, each in table.points.items() if agree(corners[name], wanted)}
     left_out = [*table.left_out, f"{len(table.points) - len(kept)} points of other corners"]
@@ -245,14 +245,14 @@ def _require_one_side_and_upright(
     Args:
         written: returns x, y or z (0, 1, 2) of a role as in the file: "y = 750 mm".
     """
-    advice = "correct --axes" if table.axes is None else "correct the points"
+    advice = "Correct --axes" if table.axes is None else "Correct the points"
     across = [role for role, (_, y, _) in at.items() if y < -ACROSS * at[WHEEL_CENTER][1]]
     for role in across[:1]:
         raise fault(
             table.file,
             named[role],
             f"found {written(role, 1)}, on the other side than {named[WHEEL_CENTER]} with"
-            f" {written(WHEEL_CENTER, 1)}, expected all points on one side; correct its sign",
+            f" {written(WHEEL_CENTER, 1)}, expected all points on one side. Correct its sign",
         )
     arms = [(f"{role.removesuffix('_rear')}_front", role) for role in at if role.endswith("_rear")]
     for front, rear in (*arms, *template.ahead):
@@ -261,7 +261,7 @@ def _require_one_side_and_upright(
                 table.file,
                 named[front],
                 f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it"
-                f" in front of that; {advice}",
+                f" in front of that. {advice}",
             )
     for high, low in (*template.above, (WHEEL_CENTER, WHEEL_CONTACT)):
         if low in at and at[high][2] <= at[low][2]:
@@ -269,5 +269,5 @@ def _require_one_side_and_upright(
                 table.file,
                 named[high],
                 f"found {written(high, 2)}, not above {named[low]} with {written(low, 2)}, expected"
-                f" it above; {advice}",
+                f" it above. {advice}",
             )

@@ -72,7 +72,7 @@ def read_hardpoints(file: Path, supplied: WheelOptions = NOTHING) -> HardpointTa
 
     reader = reader_of(file, supplied)
     if not isinstance(reader, HardpointReader):
-        raise fault(file, "", "is no table of hardpoints; give a table, such as car.csv")
+        raise fault(file, "", "is no table of hardpoints. Give a table, such as car.csv")
     return reader.table(file, supplied)
 
 
@@ -125,7 +125,7 @@ def _is_assetto(file: Path, text: str, supplied: WheelOptions) -> int:
         raise fault(
             file,
             "",
-            "found an .ini file without points such as WBCAR_TOP_FRONT or STRUT_CAR; give the"
+            "found an .ini file without points such as WBCAR_TOP_FRONT or STRUT_CAR. Give the"
             " suspensions.ini of Assetto Corsa",
         )
     return 1

@@ -31,7 +31,7 @@ def template_of(table: HardpointTable, supplied: WheelOptions) -> tuple[Template
     fill by their names, with a note.
 
     Raises:
-        CaseError: there is no such template, two are stated, or nothing tells which it is.
+        CaseError: there is no such template, two are stated, or it stays open.
     """
     if (stated := stated_template(table, supplied)) is not None:
         return stated, []
@@ -41,7 +41,7 @@ def template_of(table: HardpointTable, supplied: WheelOptions) -> tuple[Template
         fewest = min(lacking.values())
         fitting = [TEMPLATES[name] for name, count in lacking.items() if count == fewest <= FEW]
     if len(fitting) != 1:
-        problem = "does not say what suspension it is of, expected it from you; add --template"
+        problem = "does not say what suspension it is of, expected it from you. Add --template"
         names = " or ".join(each.name for each in fitting) or f"one of {', '.join(TEMPLATES)}"
         raise fault(table.file, "", f"{problem} {names}")
     (found,) = fitting
@@ -69,14 +69,14 @@ def stated_template(table: HardpointTable, supplied: WheelOptions) -> Template |
         return None if said is None else known[compact(said)]
     if compact(table.template) not in known:
         problem = (
-            f"found {shown(table.template)}, expected one of those that there is a template for;"
-            f" known: {', '.join(TEMPLATES)}"
+            f"found {shown(table.template)}, expected one of those that there is a template for."
+            f" Known: {', '.join(TEMPLATES)}"
         )
         raise fault(table.file, "Template", problem)
     written = known[compact(table.template)]
     if said is not None and known[compact(said)] is not written:
         problem = (
-            f"found {said}, but the file is of a {table.template}, expected {written.name}; leave"
+            f"found {said}, but the file is of a {table.template}, expected {written.name}. Leave"
             " out --template"
         )
         raise fault(table.file, "--template", problem)
@@ -114,7 +114,7 @@ def fill_roles(
         filled, guessed, missing = filled | near, guessed | near, []
     if guessed:
         taken = ", ".join(f"{role} is {visible(name)!r}" for role, name in guessed.items())
-        told.append(f"names guessed: {taken}; --names FILE states them, --ask-names refuses")
+        told.append(f"names guessed: {taken}. --names FILE states them, --ask-names refuses")
     if unnamed is not None and not missing:
         told.append(f"{unnamed}: all lines are comments, so it names no point")
     if own is not None and new:
@@ -132,26 +132,26 @@ def fill_roles(
     if unnamed is not None:
         expected = f'expected lines such as {missing[0].name} = "NAME"'
         problem = f"found no names, all lines are comments, {expected}"
-        raise fault(unnamed, "", f"{problem}; take the # away from lines that you fill in")
+        raise fault(unnamed, "", f"{problem}. Take the # away from lines that you fill in")
     problem = f"template {template.name}: missing {'; '.join(lines)}"
-    advice = "say with --names FILE which point is which; a new FILE is written to be filled in"
+    advice = "say with --names FILE which point is which. A new FILE is written to be filled in"
     if new:
         advice = f"fill in {own}, which is written"
     raise fault(
         table.file,
         "",
-        f"{problem}; found beside: {listed(unused)}; rename or add them, or {advice}",
+        f"{problem}. Found beside: {listed(unused)}. Rename or add them, or {advice}",
     )
 
 
 def _by_names(
     table: HardpointTable, template: Template, supplied: WheelOptions, given: Mapping[str, str]
 ) -> tuple[dict[str, str], list[str], dict[str, str]]:
-    """Return the points of roles by their names, the roles among them that only words tell, and for
-    each needed role without a point the name most like it, if there is one.
+    """Return the points of roles by their names, the roles among them by words alone, and for each
+    needed role without a point the name most like it, if there is one.
 
     Args:
-        given: points of roles that are known otherwise.
+        given: points of roles known otherwise.
 
     Raises:
         CaseError: two points have names of one role.
@@ -167,7 +167,7 @@ def _by_names(
             raise fault(
                 table.file,
                 role.name,
-                f"found {places}, expected one point; remove what {role.meaning} is not",
+                f"found {places}, expected one point. Remove what {role.meaning} is not",
             )
         if not found and not supplied.ask_names and len(found := worded(role)) == 1:
             by_words.append(role.name)
@@ -192,8 +192,8 @@ _Names: TypeAlias = Callable[[Role], list[str]]
 
 
 def _points_by_role(table: HardpointTable) -> tuple[_Names, _Names]:
-    """Return what gives the points with a name of a role, or else with one and their side; and what
-    gives those whose names say it in other words.
+    """Return the functions from a role to the points with one of its names, or else with one and
+    their side; and to those with a name in other words.
     """
     by_compact_name = dict[str, list[str]]()
     by_side_name = dict[str, list[str]]()
@@ -260,7 +260,7 @@ def _write_names(file: Path, template: Template, filled: Mapping[str, str]) -> N
     try:
         file.write_text(names_text(template, filled), encoding="utf-8")
     except OSError as error:
-        raise fault(file, "--names", f"cannot be written ({error}); choose another file") from None
+        raise fault(file, "--names", f"cannot be written ({error}). Choose another file") from None
 
 
 def listed(names: Sequence[str]) -> str:
@@ -284,7 +284,7 @@ def _read_own_names(file: Path, roles: Iterable[str], points: Iterable[str]) -> 
         require_known(file, role, role, roles, "a role")
         if not isinstance(name, str):
             raise fault(
-                file, role, f"found {shown(name)}, expected the name of a point; write it in quotes"
+                file, role, f"found {shown(name)}, expected the name of a point. Write it in quotes"
             )
         require_known(file, role, name, points, "a point of the table")
         found[role] = name

@@ -124,7 +124,7 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
         lines = plain_lines(text)
     if not lines:
         raise fault(
-            file, "", f"is empty, expected a table of hardpoints; begin it with {','.join(HEAD)}"
+            file, "", f"is empty, expected a table of hardpoints. Begin it with {','.join(HEAD)}"
         )
     if is_assignments(lines):
         return read_assignments(file, lines, facts, supplied)
@@ -132,14 +132,14 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
         raise fault(
             file,
             "",
-            f"found {len(lines)} lines, expected a suspension's, {MOST_LINES} at most; take out the"
+            f"found {len(lines)} lines, expected a suspension's, {MOST_LINES} at most. Take out the"
             " others",
         )
     if supplied.sheet is not None:
         raise fault(
             file,
             "--sheet",
-            f"found {shown(supplied.sheet)} for a table of text, expected none; leave it out",
+            f"found {shown(supplied.sheet)} for a table of text, expected none. Leave it out",
         )
     found = read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
     if remarks:
@@ -165,7 +165,7 @@ def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:
         raise fault(
             file,
             "",
-            f"found no head on the sheets {names}, expected {','.join(HEAD)}; write it above the"
+            f"found no head on the sheets {names}, expected {','.join(HEAD)}. Write it above the"
             " points",
         )
     corners = {sheet.name: corner_of(sheet.name) for sheet in tables}
@@ -175,13 +175,13 @@ def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:
         if not tables:
             names = ", ".join(map(shown, corners))
             problem = f"found the sheets {names}, expected one of {supplied.corner}"
-            raise fault(file, "--corner", f"{problem}; correct it, or choose by --sheet NAME")
+            raise fault(file, "--corner", f"{problem}. Correct it, or choose by --sheet NAME")
     if len(tables) > 1:
         names = shortened([brief(shown(each.name)) for each in tables], MOST_NAMED)
         corner = corners[tables[0].name] if all(corners.values()) else None
         which = ("corner", _word_of(corner)) if corner else ("sheet", tables[0].name)
         option = shlex.join([f"--{which[0]}", which[1]])
-        why = f"{option}: the sheets {names} have tables; this is the first."
+        why = f"{option}: the sheets {names} have tables. This is the first."
         raise OpenError(file, [why], dict([which]), {})
     sheet = one_sheet(file, tables, "--sheet NAME")
     found = read_rows(sheet, f"Sheet {shown(sheet.name)}:", {}, supplied)
@@ -223,7 +223,7 @@ def _join_words(words: Sequence[Cell]) -> Sequence[Cell]:
 
 
 def _with_names(rows: Sequence[Row]) -> Iterator[Row]:
-    """Yield rows between blanks; a head x, y, z may stand above rows that begin with names."""
+    """Yield rows between blanks; a head x, y, z may stand above rows with names first."""
     for k, (where, cells) in enumerate(rows):
         after = rows[k + 1][1] if k + 1 < len(rows) else ()
         three = [_column(str(cell))[0] for cell in cells] == ["x", "y", "z"]
@@ -254,7 +254,7 @@ def read_rows(
         raise fault(
             file,
             where,
-            f"found {shown(_row_text(cells))}, expected the head {','.join(HEAD)}; write it above"
+            f"found {shown(_row_text(cells))}, expected the head {','.join(HEAD)}. Write it above"
             " the points, or a name and x, y, z alone in each row",
         )
     head, above, body = parts
@@ -275,15 +275,15 @@ def read_rows(
         raise fault(
             file,
             head.where,
-            f"found coordinates in {unit}, and {facts['unit']} in a comment, expected one unit;"
-            " correct either",
+            f"found coordinates in {unit}, and {facts['unit']} in a comment, expected one unit."
+            " Correct either",
         )
     for where, cells in body:
         if _as_head(file, where, cells):
             raise fault(
                 file,
                 where,
-                "found a second head, expected one table (of the front, or of the rear); keep one",
+                "found a second head, expected one table (of the front, or of the rear). Keep one",
             )
     chosen, body, others = _of_one_corner(file, head, body, supplied.corner)
     left_out += others
@@ -306,7 +306,7 @@ def read_rows(
     points = _points(file, found, "," if delimiter == "," else ".,")
     if not points:
         raise fault(
-            file, "", "found a head and no row, expected hardpoints; the file was cut: save it anew"
+            file, "", "found a head and no row, expected hardpoints. The file was cut: save it anew"
         )
     of_corners = head.of_corners if chosen else []
     columns = [name for k, name in enumerate(head.names) if k not in of_corners]
@@ -353,9 +353,9 @@ def _of_one_corner(
         listed = shortened([" ".join(filter(None, each)) for each in names], MOST_NAMED)
         if said is None:
             word = _word_of(next(iter(names)))
-            why = f"--corner {word}: the table has points of {listed}; this is the first."
+            why = f"--corner {word}: the table has points of {listed}. This is the first."
             raise OpenError(file, [why], {"corner": word}, {})
-        problem = f"found points of {listed}, expected {said}; choose one of them"
+        problem = f"found points of {listed}, expected {said}. Choose one of them"
         raise fault(file, "--corner", problem)
     kept = [row for row, corner in zip(body, corners, strict=True) if corner == chosen[0]]
     others = [
@@ -421,8 +421,8 @@ def _require_complete(
         raise fault(
             file,
             where,
-            f"found {filled} fields, expected {len(expected)}: {', '.join(map(brief, expected))};"
-            f" complete the row{comma}",
+            f"found {filled} fields, expected {len(expected)}: {', '.join(map(brief, expected))}."
+            f" Complete the row{comma}",
         )
 
 
@@ -463,7 +463,7 @@ def _as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
             raise fault(
                 file,
                 where,
-                f"found the column {shown(column)} twice, expected it once; take out the one that"
+                f"found the column {shown(column)} twice, expected it once. Take out the one that"
                 " is no coordinate",
             )
         columns[column] = k
@@ -483,7 +483,7 @@ def _as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
         raise fault(
             file,
             where,
-            f"found {shown(','.join(texts))}, expected one unit for x, y and z; write it with each"
+            f"found {shown(','.join(texts))}, expected one unit for x, y and z. Write it with each"
             " or with none",
         )
     return Head(where, [columns[each] for each in HEAD], texts, units.pop())
@@ -518,7 +518,7 @@ def _by_coordinate(file: Path, rows: Sequence[Row]) -> _Parts | None:
             raise fault(
                 file,
                 where,
-                f"found {len(values)} numbers for {name} {axis}, expected one; keep the numbers of"
+                f"found {len(values)} numbers for {name} {axis}, expected one. Keep the numbers of"
                 " one design (a decimal comma needs semicolons between the fields)",
             )
         place = points.setdefault(name, {})

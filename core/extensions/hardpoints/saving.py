@@ -43,7 +43,7 @@ def save_table(
     if not NAME.fullmatch(name):
         raise KincheckError(
             f"save {name!r}: expected a plain name that ends in .csv, of letters, digits, dots,"
-            " dashes and blanks; give another"
+            " dashes and blanks. Give another"
         )
     return write_table(table, supplied, points, table.file.parent / name, f"save {name}")
 
@@ -71,7 +71,7 @@ def write_table(
             return path
         path.unlink()
     raise KincheckError(
-        f"{option}: the file would be read with other numbers; nothing was written: save the"
+        f"{option}: the file would be read with other numbers. Nothing was written: save the"
         " table from the program that made it"
     )
 
@@ -82,10 +82,10 @@ def _write(path: Path, content: bytes, option: str) -> None:
         with open(os.open(path, flags | getattr(os, "O_BINARY", 0), 0o644), "wb") as file:
             file.write(content)
     except FileExistsError:
-        raise KincheckError(f"{option}: the file exists and stays; give another name") from None
+        raise KincheckError(f"{option}: the file exists and stays. Give another name") from None
     except OSError as error:
         raise KincheckError(
-            f"{option}: cannot be written ({error.strerror}); give another name, or start"
+            f"{option}: cannot be written ({error.strerror}). Give another name, or start"
             " kincheck with a file in a folder that is writable"
         ) from None
 

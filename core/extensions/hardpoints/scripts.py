@@ -73,11 +73,11 @@ def read_python(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hard
         units = _units(text, found)
     except (SyntaxError, ValueError, RecursionError, MemoryError, tokenize.TokenError) as error:
         why = brief(f"{type(error).__name__}: {error}".replace("\n", " "))
-        raise fault(file, "", f"is no Python script of points ({why}); correct it") from None
+        raise fault(file, "", f"is no Python script of points ({why}). Correct it") from None
     left_out = [f"line {each.lineno}" for (each, _, targets), _ in found if not targets]
     leaves = [leaf for _, own in found for leaf in own if leaf.keys[0] not in script.named]
     if len(leaves) >= MOST_LINES:
-        raise fault(file, "", f"found more than {MOST_LINES} values; give the points only")
+        raise fault(file, "", f"found more than {MOST_LINES} values. Give the points only")
     _require_unchanged(file, found)
     facts = with_unit(file, facts_of_comments(file, text), units)
     return table_of(file, "Python", [*leaves, *fact_leaves(facts)], supplied, left_out)
@@ -263,6 +263,6 @@ def _require_unchanged(file: Path, found: Iterable[tuple[Statement, Sequence[Lea
                     file,
                     f"line {each.lineno}",
                     f"changes {'.'.join(path)}, expected points that are assigned once, since"
-                    " nothing is executed; write the changed numbers, or a table of them",
+                    " nothing is executed. Write the changed numbers, or a table of them",
                 )
         before |= {leaf.keys for leaf in own if leaf.triple or leaf.coordinate}

@@ -87,7 +87,7 @@ def read_suspension(section: Section, case: Case) -> SuspensionTable:
     if abs(vec(forward) @ vec(up)) > SQUARE:
         raise section.at("up").fault(
             f"found {shown(keys.up)}, which is not at right angles to forward ="
-            f" {shown(keys.forward)}, expected axes of the vehicle's body; correct one of them"
+            f" {shown(keys.forward)}, expected axes of the vehicle's body. Correct one of them"
         )
     given = msgspec.structs.asdict(keys)
     given = {name: each for name, each in given.items() if name not in _NOT_OF_VEHICLE}
@@ -135,7 +135,7 @@ def _kingpin(
         check_point(section.at(name), point, mechanism)
     if rods and keys.kingpin:
         raise section.at("kingpin_links").fault(
-            "found beside kingpin, expected one of them; remove the other"
+            "found beside kingpin, expected one of them. Remove the other"
         )
     return keys.kingpin or rods
 
@@ -149,21 +149,21 @@ def _check_vehicle(section: Section, vehicle: Vehicle, mechanism: Mechanism) -> 
     if mechanism.is_fixed(center.body):
         raise section.at("wheel_center").fault(
             f"found {shown(center.name)}, which is on {shown(center.body)}, expected a point of a"
-            " body that moves; name the centre of the wheel"
+            " body that moves. Name the centre of the wheel"
         )
     aside = vehicle.outboard @ (vec(center.position) - vec(vehicle.middle))
     if aside <= 0.0:
         raise section.at("side").fault(
             f"found {shown(str(vehicle.side))}, but {vehicle.wheel_center!r} is"
             f" {section.units.length.written(-aside)} on the other side of the centre plane,"
-            " expected the side on which it is, looking forward with up upwards; correct side,"
+            " expected the side on which it is, looking forward with up upwards. Correct side,"
             " forward, up or center_plane"
         )
     ends = [vec(mechanism.point(name).position) for name in vehicle.kingpin_points]
     if len(ends) == 2 and vec(vehicle.up) @ (ends[1] - ends[0]) <= 0.0:
         raise section.at("kingpin").fault(
             f"found {[*vehicle.kingpin_points]!r}, the first of which is not the lower, expected"
-            " the lower point, then the upper; give them in this order"
+            " the lower point, then the upper. Give them in this order"
         )
     angles = bool(vehicle.static_toe or vehicle.static_camber)
     for name, given, numbers in (
@@ -175,23 +175,23 @@ def _check_vehicle(section: Section, vehicle: Vehicle, mechanism: Mechanism) -> 
         check_point(section.at(name), point, mechanism)
         if given:
             raise section.at(name).fault(
-                f"found beside {numbers}, expected one of them; remove the other"
+                f"found beside {numbers}, expected one of them. Remove the other"
             )
         if (body := mechanism.point(point).body) != center.body:
             raise section.at(name).fault(
                 f"found {shown(point)}, which is on {shown(body)}, expected a point of the wheel"
-                f" carrier {shown(center.body)}; name one"
+                f" carrier {shown(center.body)}. Name one"
             )
     if vehicle.wheel_axis is not None and vehicle.aside(mechanism) <= 0.0:
         raise section.at("wheel_axis").fault(
             f"found {shown(vehicle.wheel_axis)}, which is not outboard of the wheel's centre,"
-            " expected a point that is; name another"
+            " expected a point that is. Name another"
         )
     radius = vehicle.radius(mechanism)
     if radius == 0.0:
         raise section.at("wheel_contact").fault(
             f"found {shown(vehicle.wheel_contact)}, which is at the wheel's centre, expected a"
-            " point at the road; name another"
+            " point at the road. Name another"
         )
     return replace(vehicle, wheel_radius=radius)
 
@@ -236,8 +236,8 @@ def suspension_lines(case: Case) -> list[str]:
     alike = replace(other, side=first.side, **{name: getattr(first, name) for name in own})
     if more or alike != first or other.side is first.side:
         raise CaseError(
-            f"case {case.name!r}: its outputs are of several axles, and [suspension] is of one;"
-            " leave out the others"
+            f"case {case.name!r}: its outputs are of several axles, and [suspension] is of one."
+            " Leave out the others"
         )
     names = {*_OWN, "kingpin_links", "travel"}
     of_other = {key: value for key, value in _keys(other, -1).items() if key in names}
@@ -288,16 +288,16 @@ def _of_wheel(
     suspension = Section(section.file, "suspension", None)
     what = f"for {section.key} of type {cls.type!r}"
     if table is None:
-        raise suspension.fault(f"missing, expected a table {what}; add [suspension]")
+        raise suspension.fault(f"missing, expected a table {what}. Add [suspension]")
     keys: Any = section.typed(keys_of(cls))
     if issubclass(cls, AxleOutput) and table.other is None:
         raise suspension.at("other").fault(
-            f"missing, expected the other wheel {what}; add [suspension.other]"
+            f"missing, expected the other wheel {what}. Add [suspension.other]"
         )
     vehicle = _wheel(section, table, getattr(keys, "side", None))
     for need in cls.needs:
         if getattr(vehicle, need) is None:
-            raise suspension.at(need).fault(f"missing, expected it {what}; add it")
+            raise suspension.at(need).fault(f"missing, expected it {what}. Add it")
     given: dict[str, Any] = {each.name: getattr(keys, each.name) for each in own_keys(cls)}
     if issubclass(cls, AxleOutput):
         given["other"] = table.other
@@ -315,7 +315,7 @@ def _of_wheel(
     if isinstance(output, Rate) and len(moving) > 1 and not output.vehicle.travel:
         raise section.at("type").fault(
             f"found {output.type!r} while {', '.join(moving)} move, expected one of them to be the"
-            " wheel's travel, for it is a derivative by that; name it by suspension.travel"
+            " wheel's travel, for it is a derivative by that. Name it by suspension.travel"
         )
     return output
 
@@ -326,8 +326,8 @@ def _wheel(section: Section, table: SuspensionTable, side: Side | None) -> Vehic
         if side in (None, wheel.side):
             return wheel
     raise section.at("side").fault(
-        f"found {shown(str(side))}, expected {table.vehicle.side}, the side in [suspension];"
-        " correct it, or add [suspension.other]"
+        f"found {shown(str(side))}, expected {table.vehicle.side}, the side in [suspension]."
+        " Correct it, or add [suspension.other]"
     )
 
 

@@ -39,15 +39,15 @@ _NAMED_AXES: Mapping[str, str] = {
 _ADVICE: Sequence[tuple[re.Pattern[str], str]] = (
     (
         re.compile(r"[=+@-]?[A-Za-z=]+.*[!(]|=|[+-]?\$?[A-Z]{1,3}\$?\d+"),
-        "write the value of the formula: save the table anew from the spreadsheet program",
+        "Write the value of the formula: save the table anew from the spreadsheet program",
     ),
-    (re.compile(r"[-+]?\d{1,3}([\s'’]\d{3})+"), "remove the separators of thousands"),
+    (re.compile(r"[-+]?\d{1,3}([\s'’]\d{3})+"), "Remove the separators of thousands"),
     (
         re.compile(r"[-+]?[\d.,]+\s*(mm|cm|m|in|inch|ft|\")$"),
-        "leave the unit out, and state it in the head or by --units",
+        "Leave the unit out, and state it in the head or by --units",
     ),
-    (re.compile(r"[\u2010-\u2015]"), "write the minus sign as a hyphen, -"),
-    (re.compile(r"\d{4}-\d\d-\d\d"), "a spreadsheet took the number for a date: type it anew"),
+    (re.compile(r"[\u2010-\u2015]"), "Write the minus sign as a hyphen, -"),
+    (re.compile(r"\d{4}-\d\d-\d\d"), "A spreadsheet took the number for a date: type it anew"),
 )
 """Remedies for invalid coordinates."""
 
@@ -125,14 +125,14 @@ def wanted_corner(file: Path, said: str) -> tuple[str, str]:
 def twice(file: Path, where: str, name: str, before: str) -> CaseError:
     """Return the error of a point or coordinate that a file gives again."""
     return fault(
-        file, where, f"{name}: given before, in {before}, expected once; remove one of them"
+        file, where, f"{name}: given before, in {before}, expected once. Remove one of them"
     )
 
 
 def incomplete(file: Path, where: str, name: str, axes: Collection[str]) -> CaseError:
     """Return the error of a point of which a file gives some coordinates."""
     missing = " and ".join(axis for axis in "xyz" if axis not in axes)
-    return fault(file, where, f"found {name} without {missing}, expected all three; add it")
+    return fault(file, where, f"found {name} without {missing}, expected all three. Add it")
 
 
 def one_unit(file: Path, units: Mapping[str, str]) -> str:
@@ -149,7 +149,7 @@ def one_unit(file: Path, units: Mapping[str, str]) -> str:
         raise fault(
             file,
             units[other],
-            f"found {shown(other)}, and {shown(first)} above, expected one unit; write all"
+            f"found {shown(other)}, and {shown(first)} above, expected one unit. Write all"
             " coordinates in one",
         )
     return next(iter(units), "")
@@ -159,7 +159,7 @@ def require_name(file: Path, where: str, name: str) -> None:
     """Refuse a name of a point that cannot be printed, or none."""
     if not name or not name.isprintable():
         raise fault(
-            file, where, f"found the name {name!r}, expected printable characters; name the point"
+            file, where, f"found the name {name!r}, expected printable characters. Name the point"
         )
 
 
@@ -181,7 +181,7 @@ def number(file: Path, where: str, text: object, sign: str = ".") -> float:
         raise fault(
             file,
             where,
-            f"found {shown(text)}, expected a coordinate; {advice or 'correct the number'}",
+            f"found {shown(text)}, expected a coordinate. {advice or 'Correct the number'}",
         )
     return found
 
@@ -215,7 +215,7 @@ def unit_of(table: HardpointTable, said: str | None) -> Unit:
             raise fault(
                 table.file,
                 "",
-                "does not say in which unit its coordinates are, expected it from you; add --units"
+                "does not say in which unit its coordinates are, expected it from you. Add --units"
                 " mm or --units m, or else cm, inch or foot",
             )
         return LENGTHS[written]
@@ -226,7 +226,7 @@ def unit_of(table: HardpointTable, said: str | None) -> Unit:
         raise fault(
             table.file,
             "--units",
-            f"found {said}, but the file is in {written}; leave out --units, or correct the file",
+            f"found {said}, but the file is in {written}. Leave out --units, or correct the file",
         )
     return LENGTHS[name]
 
@@ -250,7 +250,7 @@ def axes_of(table: HardpointTable, said: str | None) -> Axes:
         raise fault(
             table.file,
             "",
-            f"does not say where x, y and z point, expected it from you; add --axes {AXES_IN_USE}",
+            f"does not say where x, y and z point, expected it from you. Add --axes {AXES_IN_USE}",
         )
     places = None if table.axes is None else _places(table.file, "axes", table.axes)
     if said is None:
@@ -261,7 +261,7 @@ def axes_of(table: HardpointTable, said: str | None) -> Axes:
         raise fault(
             table.file,
             "--axes",
-            f"found {said}, but the points of this file are {table.axes}; leave out --axes",
+            f"found {said}, but the points of this file are {table.axes}. Leave out --axes",
         )
     return found
 
@@ -285,6 +285,6 @@ def _places(file: Path, key: str, text: str) -> list[tuple[int, float]]:
             file,
             key,
             f"found {shown(text)}, expected where x, y and z point, one each of forward or"
-            " rearward, left or right, up or down; write them with commas: forward,left,up",
+            " rearward, left or right, up or down. Write them with commas: forward,left,up",
         )
     return places

@@ -165,7 +165,7 @@ def head_of_corner(column: str) -> str:
 
 
 def kind_of_head(column: str) -> str:
-    """Return what a column has, by its head: as `head_of_corner`, or "name" or "number"."""
+    """Return the kind of a column by its head: as `head_of_corner`, or "name" or "number"."""
     word = compact(column)
     return next((what for what, words in NAMES["heads"].items() if word in words), "")
 

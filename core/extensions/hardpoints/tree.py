@@ -170,7 +170,7 @@ def add_fact(file: Path, where: str, facts: dict[str, str], fact: tuple[str, str
     name, value = fact
     if facts.setdefault(name, value).lower() != value.lower():
         problem = f"found {name} {shown(value)}, and {shown(facts[name])} above, expected one"
-        raise fault(file, where, f"{problem}; remove either")
+        raise fault(file, where, f"{problem}. Remove either")
 
 
 def facts_of_comments(file: Path, text: str) -> dict[str, str]:
@@ -257,7 +257,7 @@ def with_unit(file: Path, facts: Mapping[str, str], units: Mapping[str, str]) ->
     stated = facts.get("unit", unit)
     if unit and length_name(stated) != unit:
         problem = f"found {unit}, and {stated} in a comment, expected one unit"
-        raise fault(file, units[unit], f"{problem}; correct either")
+        raise fault(file, units[unit], f"{problem}. Correct either")
     return {"unit": stated, **facts} if unit else dict(facts)
 
 
@@ -316,7 +316,7 @@ def table_of(
             file,
             "",
             "found no point, expected three numbers such as lca_front: [0.1, 0.3, 0.2], or x, y and"
-            " z below a name; give a file of hardpoints (beside a URDF, give the URDF)",
+            " z below a name. Give a file of hardpoints (beside a URDF, give the URDF)",
         )
     chosen, dropped, corner = _of_one_suspension(file, [*points], supplied)
     found = dict[str, Hardpoint]()
@@ -470,8 +470,8 @@ def _of_one_suspension(
         raise fault(
             file,
             "",
-            f"found points in {', '.join(map(shown, sections))}, expected those of one suspension;"
-            " choose a section by --sheet NAME, or --corner FL",
+            f"found points in {', '.join(map(shown, sections))}, expected those of one suspension."
+            " Choose a section by --sheet NAME, or --corner FL",
         )
     names = {
         keys: ".".join(

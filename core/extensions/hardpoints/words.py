@@ -1,5 +1,5 @@
-"""Words of tables in several languages: what names of points, keys and free texts say, by the lists
-of `words.toml`.
+"""Words of tables in several languages: meanings of names of points, keys and free texts, by the
+lists of `words.toml`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _AXIS = re.compile(r"(?<![^\W_])([xyz])(?![^\W_])")
 
 
 def said(text: str, kind: str) -> list[str]:
-    """Return what a text says, in the order of its words.
+    """Return the meanings in a text, in the order of its words.
 
     Args:
         kind: list of words, such as "name".
@@ -67,10 +67,10 @@ def side_in(name: str) -> str:
 
 
 def by_words(names: Collection[str], side: str) -> Callable[[str], list[str]]:
-    """Return the function that gives the names of a role's points, by what they say.
+    """Return the function from a role to the names of its points, by their meaning.
 
     Args:
-        side: of the wheel; names that say the other one are left out.
+        side: of the wheel; names of the other one are left out.
     """
     other = "right" if side == "left" else "left"
     says = {name: {*said(name, "name")} for name in names}
@@ -159,11 +159,11 @@ def _directions(plain: str) -> Iterator[tuple[str, str]]:
 
 
 def template_said(text: str) -> str:
-    """Return the template that a free text names; empty without one, or with several."""
+    """Return the template in a free text; empty without one, or with several."""
     found = {*said(text, "template")}
     return found.pop() if len(found) == 1 else ""
 
 
 def first_said(read: Callable[[str], str], texts: Iterable[str]) -> str:
-    """Return what the first text says that says something to a function; empty without one."""
+    """Return the first answer of a function on texts; empty without one."""
     return next((found for each in texts if (found := read(each))), "")

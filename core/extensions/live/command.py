@@ -35,8 +35,8 @@ class Serve(Command):
     only. Ctrl-C ends it, with status 130; status 2 means that the file cannot be read or the port
     cannot be used.
 
-    A table whose names do not tell which point is which has a page of its own first: its points in
-    3D with proposed roles, and a button that saves them as a file of names.
+    A table without names of roles has a page of its own first: its points in 3D with proposed
+    roles, and a button to save them as a file of names.
     """
 
     about = "edit a suspension or move a mechanism in a browser"
@@ -109,7 +109,7 @@ class Serve(Command):
             naming.close()
 
     def _naming(self, registry: Registry) -> NamingServer | None:
-        """Return the server of the page that names points; None unless a table needs it."""
+        """Return the server of the page to name points; None unless a table needs it."""
         from ..hardpoints.reader import is_table
         from .naming import NamingServer, naming_of
 

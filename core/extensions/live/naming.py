@@ -1,4 +1,4 @@
-"""The page that names unnamed points: in 3D, role by role, with roles proposed by geometry. The
+"""A page to name unnamed points: in 3D, role by role, with roles proposed by geometry. The
 answer is the house's file of names.
 """
 
@@ -44,7 +44,7 @@ def naming_of(file: Path, supplied: WheelOptions) -> Guess | None:
 
 
 def points_of(guess: Guess) -> dict[str, Any]:
-    """Return what the page shows: points in metres, x forward, y left, z up; roles with their
+    """Return the data of the page: points in metres, x forward, y left, z up; roles with their
     proposed point; and pairs of roles with a link between.
     """
     table, taken, template = guess.table, guess.taken, guess.fit.template
@@ -102,7 +102,7 @@ class NamingServer:
     Attributes:
         address: with the token.
         saved: is set when the names are saved.
-        following: the address that the page goes on to, if there is one.
+        following: the next address of the page, if there is one.
     """
 
     def __init__(self, guess: Guess, port: int = 0) -> None:
@@ -141,7 +141,7 @@ class _Handler(BaseHTTPRequestHandler):
     server_of: NamingServer
 
     def do_GET(self) -> None:
-        """Answer with a file of the page, its data, or where to go on."""
+        """Answer with a file of the page, its data, or the next address."""
         path = urlsplit(self.path).path
         own = Path(__file__).parent
         if not self._allowed(path in ("/", "/points", "/next")):

@@ -299,7 +299,7 @@ class ProgramEngine:
             )
         if shutil.which(words[0]) is None:
             raise KincheckError(
-                f"{OPTION}: there is no program {words[0]!r} that can be run; correct its name, or"
+                f"{OPTION}: there is no program {words[0]!r} that can be run. Correct its name, or"
                 " give its path"
             )
 

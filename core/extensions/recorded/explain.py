@@ -15,7 +15,7 @@ from ...case.case import TIME, Case, Quantity, Series, Sweep
 from ...case.io.reference_samples import RATES
 from ...errors import shortened
 from ...harness.compare import Curve, curve_of, deviation
-from ...harness.suspects import slips
+from ...harness.suspects import FACTORS, OTHER_SIGN, slips
 from ...trajectory import Array
 from ...unit_text import value_text
 from .meaning import MAP
@@ -117,6 +117,7 @@ def explain_slips(
     off = [each for each in every if not each.fits(each.values - each.true)]
     held = {each.output.name: each.held for each in every}
     known = dict[str, list[tuple[str, str]]]()
+    maps = dict[str, list[str]]()
     for each in off:
         name = each.output.name
         others = {key: other for key, other in held.items() if key != name}
@@ -126,12 +127,13 @@ def explain_slips(
                 remaining = next(iter(changes.values())).max_abs
                 left = value_text(f"{remaining:.2g}", each.output.unit)
                 known.setdefault(words, []).append((name, left))
+                maps.setdefault(words, []).extend(_stating(next(iter(changes)), name, stated))
                 break
     # bodies or columns exchanged leave a sentence for each output
     most = list(known.items())[:_NAMED]
     sentences = [
         f"{shortened([name for name, _ in names], _NAMED)}: the recording {words} leaves"
-        f" {names[0][1]}"
+        f" {names[0][1]}" + f". If it is meant, say {' '.join(maps[words])}" * bool(maps[words])
         for words, names in most
     ]
     all_known = sum(map(len, known.values())) == len(off)
@@ -295,6 +297,24 @@ class _Change:
                 leaves = value_text(f"{largest[0]:.2g}", largest[1])
                 return f"read with {' '.join(maps)} the recording leaves {leaves}"
         return ""
+
+
+def _stating(words: str, name: str, stated: Mapping[str, Stated]) -> list[str]:
+    """Return the option that states a slip of an output with a column of its own; none for a slip
+    that no option states, such as samples that are one late.
+    """
+    if (own := stated.get(name)) is None:
+        return []
+    first, number, *_ = f"{words} -".split()
+    offset = own.offset / own.size
+    if words == OTHER_SIGN:
+        return [_map(own, name, -own.sign, -offset, own.unit)]
+    if first in ("plus", "minus") and " and " not in words:
+        added = float(number) / own.size * (1.0 if first == "plus" else -1.0)
+        return [_map(own, name, own.sign, offset + added, own.unit)]
+    size = own.size * FACTORS.get(words.removeprefix("times "), math.nan)
+    units = [unit for unit, each in _UNITS.get(own.si, {}).items() if math.isclose(each, size)]
+    return [_map(own, name, own.sign, offset, unit) for unit in units]
 
 
 def _map(stated: Stated, name: str, sign: float, offset: float, unit: str) -> str:

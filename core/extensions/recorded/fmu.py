@@ -234,7 +234,7 @@ def read_fmu(file: Path, case: Case, maps: Sequence[str]) -> FmuEngine:
     fmi = 2 if root.attributes.get("fmiVersion", "").startswith("2.") else 3
     if not root.attributes.get("fmiVersion", "").startswith(("2.", "3.")):
         version = root.attributes.get("fmiVersion", "none")
-        raise root.fault(f"found FMI {version}, expected 2 or 3; export it anew")
+        raise root.fault(f"found FMI {version}, expected 2 or 3. Export it anew")
     _require_binary(file, names, fmi)
     token = root.attributes.get("guid" if fmi == 2 else "instantiationToken", "")
     tool = root.attributes.get("generationTool", "")
@@ -249,7 +249,7 @@ def read_fmu(file: Path, case: Case, maps: Sequence[str]) -> FmuEngine:
         problem = (
             "found no co-simulation, expected one of a model with states, which needs a solver"
         )
-        raise fault(file, "", f"{problem}; export it for co-simulation")
+        raise fault(file, "", f"{problem}. Export it for co-simulation")
     variables = _variables(root)
     meaning = Reader(file, case, [each.head for each in variables]).read(maps)
     numbers = {name: use for name, use in meaning.numbers.items() if name != TIME}
@@ -260,15 +260,15 @@ def read_fmu(file: Path, case: Case, maps: Sequence[str]) -> FmuEngine:
         head = variables[use.column].head
         if name in inputs and not variables[use.column].free:
             problem = f"found {brief(head.name)} for {name}, expected an input of the FMU"
-            raise fault(file, MAP, f'{problem}; say {MAP} "INPUT={name}"')
+            raise fault(file, MAP, f'{problem}. Say {MAP} "INPUT={name}"')
         if not (use.unit or head.unit or use.si == "1"):
             problem = f"found no unit of {head.name}, expected one of {use.si}"
-            raise fault(file, MAP, f'{problem}; say {MAP} "{head.name}={name} [UNIT]"')
+            raise fault(file, MAP, f'{problem}. Say {MAP} "{head.name}={name} [UNIT]"')
         unit_of(file, head, use)
     if not outputs:
         listed = shortened([v.head.name for v in variables if not v.free], MOST_NAMED)
         problem = f"found no output of the case among {listed}, expected one"
-        raise fault(file, MAP, f'{problem}; say {MAP} "VARIABLE=OUTPUT"')
+        raise fault(file, MAP, f'{problem}. Say {MAP} "VARIABLE=OUTPUT"')
     identifier = kinds["CoSimulation" if stepping else "ModelExchange"]
     found = tuple(variables), inputs, outputs, fmi, tool, token, identifier, stepping
     return FmuEngine(file, case, *found)
@@ -285,13 +285,13 @@ def _description(file: Path) -> tuple[Element, Sequence[str]]:
             names = archive.namelist()
             size = archive.getinfo("modelDescription.xml").file_size
             if size > LARGEST_DESCRIPTION:
-                raise fault(file, "", f"describes itself in {size} bytes; export fewer variables")
+                raise fault(file, "", f"describes itself in {size} bytes. Export fewer variables")
             text = archive.read("modelDescription.xml").decode("utf-8")
     except CaseError:  # it is a ValueError too
         raise
     except (zipfile.BadZipFile, zlib.error, ValueError, KeyError, RuntimeError, EOFError, OSError):
         problem = "found no model description in a zip archive, expected an FMU"
-        raise fault(file, "", f"{problem}; export it anew") from None
+        raise fault(file, "", f"{problem}. Export it anew") from None
     return parse_xml(file, text), names
 
 
@@ -306,7 +306,7 @@ def _require_binary(file: Path, names: Sequence[str], fmi: int) -> None:
     there = sorted({name.split("/")[1] for name in names if name.startswith("binaries/")} - {""})
     if own not in there:
         known = ", ".join(map(brief, there[:MOST_NAMED])) or "no machine"
-        raise fault(file, "", f"has binaries for {known}, this is {own}; export it for {own}")
+        raise fault(file, "", f"has binaries for {known}, this is {own}. Export it for {own}")
 
 
 def _states(structure: Element, fmi: int) -> Sequence[Element]:
@@ -331,7 +331,7 @@ def _variables(root: Element) -> list[Variable]:
             continue
         reference = own.get("valueReference", "")
         if not (reference.isascii() and reference.isdigit() and len(reference) < 10):
-            raise each.fault("valueReference: expected a whole number; export the FMU anew")
+            raise each.fault("valueReference: expected a whole number. Export the FMU anew")
         type_ = kinds[0].attributes
         unit = type_.get("unit") or units.get(type_.get("declaredType", ""), "")
         head = Head(own.get("name", ""), unit)

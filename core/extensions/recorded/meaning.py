@@ -235,7 +235,7 @@ class Reader:
             if not (left and equals and right):
                 raise self._fault(f"found {shown(text)}, expected an equation; {FORM}")
             if left in (*numbers, *bodies) or prefixes.get(left, left) != left:
-                raise self._fault(f"found {shown(left)} twice, expected it once; leave one out")
+                raise self._fault(f"found {shown(left)} twice, expected it once. Leave one out")
             if left == EVENT and right in ("first", "last"):
                 event = right
             elif left in prefixes and ("," in right or ":" in right):
@@ -284,7 +284,7 @@ class Reader:
             if name in found:
                 both = f"{shown(self.heads[found[name].column].name)} and {shown(head.name)}"
                 problem = f"found the columns {both}, expected one for {name}"
-                raise fault(self.file, "", f'{problem}; say which by {MAP} "{name}=COLUMN"')
+                raise fault(self.file, "", f'{problem}. Say which by {MAP} "{name}=COLUMN"')
             found[name] = Use(k, self.targets[name])
         return found
 
@@ -316,7 +316,7 @@ class Reader:
             if len(places) == 1:
                 return places[0]
             if places:
-                raise self._fault(f"found several columns {shown(each)}, expected one; rename one")
+                raise self._fault(f"found several columns {shown(each)}, expected one. Rename one")
         known = [head.name for head in self.heads]
         wanted = names[0] if names else name
         raise unknown_name(self.file, MAP, wanted, known, "a column of the file")

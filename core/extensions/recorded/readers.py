@@ -85,7 +85,7 @@ def column_of(file: Path, where: str, head: Head, cells: Iterable[str]) -> Colum
         try:
             values.append(decimal(cell))
         except ValueError:
-            expected = "expected a number; correct it"
+            expected = "expected a number. Correct it"
             raise fault(file, f"{where} {k}", f"found {shown(cell)}, {expected}") from None
         printed.add(cell)
     found = np.array(values)
@@ -107,7 +107,7 @@ _NUMBERS = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)
 def _of_mat(file: Path, choose: Choose) -> Recording:
     data = read_bytes(file, LARGEST_FILE, LESS)
     if data.startswith(_V73):
-        raise fault(file, "", "found a MAT-file of version 7.3; in MATLAB: save(..., '-v7')")
+        raise fault(file, "", "found a MAT-file of version 7.3. In MATLAB: save(..., '-v7')")
     try:
         # scipy tells the level so
         if data[:4].count(0) == 0 and _unpacked_size(data) > LARGEST_FILE:
@@ -120,7 +120,7 @@ def _of_mat(file: Path, choose: Choose) -> Recording:
         raise
     except Exception as error:  # scipy raises many errors for a damaged file
         what = brief(f"{type(error).__name__}: {error}")
-        expected = "expected one of MATLAB (save with -v7) or of a Modelica tool; or give CSV"
+        expected = "expected one of MATLAB (save with -v7) or of a Modelica tool. Or give CSV"
         raise fault(file, "", f"found no readable MAT-file ({what}), {expected}") from None
     chosen = choose([head for head, _ in series])
     columns = {k: Column(series[k][0], *_numbers(series[k][1])) for k in chosen}
@@ -276,7 +276,7 @@ def read_recording(
     if suffix == ".res":
         return _of_adams(file, choose, analysis)
     if analysis is not None:
-        raise fault(file, "--analysis", "found for a file without analyses; leave it out")
+        raise fault(file, "--analysis", "found for a file without analyses. Leave it out")
     if suffix == ".mat":
         return _of_mat(file, choose)
     return _of_table(file, choose, sheet)
@@ -336,7 +336,7 @@ def _wide_table(table: Table) -> Table:
     cases = [*dict.fromkeys(case for case, *_ in samples)]
     if len(cases) > 1:
         listed = shortened([shown(case) for case in cases], MOST_NAMED)
-        problem = f"found the cases {listed}, expected one; write a file for each"
+        problem = f"found the cases {listed}, expected one. Write a file for each"
         raise fault(table.file, "case", problem)
     body = [
         (f"sample {k}", [row.get(name, "") for name in columns]) for (*_, k), row in samples.items()
@@ -352,7 +352,7 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
         raise fault(file, "", f"found {what}, expected results in XML; {advice}")
     root = parse_xml(file, text)
     if root.tag != "Results":
-        raise root.fault("found another document, expected <Results> of Adams; give its .res")
+        raise root.fault("found another document, expected <Results> of Adams. Give its .res")
     found = {
         (analysis.attributes.get("name", ""), data.attributes.get("name", "")): (analysis, data)
         for analysis in root.findall("Analysis")
@@ -373,7 +373,7 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
     for step, numbers in steps:
         if len(numbers) < max(heads, default=0):
             problem = f"found {len(numbers)} numbers, expected {max(heads)}, one a component"
-            raise step.fault(f"{problem}; write the results anew")
+            raise step.fault(f"{problem}. Write the results anew")
     ids = [*heads]
     columns = {
         k: column_of(file, "step", heads[ids[k]], (row[ids[k] - 1] for _, row in steps))
@@ -399,7 +399,7 @@ def _heads(analysis: Element) -> Mapping[int, Head]:
             number = each.attributes.get("id", "")
             if not (number.isascii() and number.isdigit() and 0 < len(number) < 9 and int(number)):
                 problem = f"id: found {shown(number)}, expected a whole number from 1"
-                raise each.fault(f"{problem}; write the results anew")
+                raise each.fault(f"{problem}. Write the results anew")
             unit = each.attributes.get("unitsValue", "").replace("**", "^").replace("sec", "s")
             head = f"{name}.{each.attributes.get('name', '')}"
             posed = part if name.endswith(_POSE) else ()

@@ -42,7 +42,7 @@ def table_of_json(file: Path, limit: int, why_limit: str) -> tuple[Table, list[s
     if len(tables) != 1:
         listed = shortened([shown(name) for name in tables], MOST_NAMED)
         several = f"found the tables {listed}, expected one; write a file for each"
-        raise fault(file, "", several if tables else f"found no records, {_FORM}; write them so")
+        raise fault(file, "", several if tables else f"found no records, {_FORM}. Write them so")
     ((key, records),) = tables.items()
     names = [*dict.fromkeys(name for record in records for name in record)]
     units = found.units
@@ -93,7 +93,7 @@ class _Content:
         if len({*lengths.values()}) > 1:
             listed = ", ".join(f"{shown(name)} {n}" for name, n in [*lengths.items()][:MOST_NAMED])
             problem = f"found columns of different lengths ({listed}), expected one length"
-            raise fault(self.file, "", f"{problem}; write a file for each")
+            raise fault(self.file, "", f"{problem}. Write a file for each")
         common = 0
         while all(len(path) > common + 1 for path in paths) and len({p[common] for p in paths}) < 2:
             common += 1
@@ -122,7 +122,7 @@ class _Content:
     def _require_shallow(self, path: tuple[str, ...]) -> None:
         if len(path) > DEEPEST:
             problem = f"nested more than {DEEPEST} deep, {_FORM}"
-            raise fault(self.file, path[0], f"{problem}; write them so")
+            raise fault(self.file, path[0], f"{problem}. Write them so")
 
 
 def _rows(value: Any) -> list[dict[str, Any]] | None:

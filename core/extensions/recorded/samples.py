@@ -186,7 +186,7 @@ def _columns_of_samples(
             rows = np.delete(rows, again if meaning.event == "last" else again + 1)
             notes.append(f"{file}: merged {number_of(again.size, 'row')} at the time of another")
     if not len(rows):
-        raise fault(file, "", "found no samples, expected rows of numbers; record the motion anew")
+        raise fault(file, "", "found no samples, expected rows of numbers. Record the motion anew")
     exact = {k for k in leading if is_set(columns[k].values, columns[k].half)}
     return {
         k: Column(c.head, c.values[rows], c.half[rows] * (k not in exact))
@@ -204,7 +204,7 @@ def _require_equal(
             raise fault(
                 file,
                 shown(each.head.name),
-                f"found {a!r} and {b!r} at one time, {time!r}, expected one value at an event; say"
+                f"found {a!r} and {b!r} at one time, {time!r}, expected one value at an event. Say"
                 f' which rows to take: {MAP} "{EVENT}=first" or "{EVENT}=last"',
             )
 

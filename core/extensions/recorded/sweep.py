@@ -103,7 +103,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
     file, sweep = samples.recording.file, case.sweep
     if samples.count > MOST_SAMPLES:
         problem = f"found {samples.count} samples, expected {MOST_SAMPLES} at most"
-        raise fault(file, "", f"{problem}; thin them out")
+        raise fault(file, "", f"{problem}. Thin them out")
     time, timed = samples.time, sweep.driver == TIME
     names = [driver.name for driver in case.mechanism.drivers]
     stated = any(name in samples.numbers for name in names)
@@ -115,7 +115,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
         turns = float(np.abs(np.diff(each.orders[0])).sum()) / TURN
         if case.mechanism.driver(name).turns and turns > MOST_TURNS:
             problem = f"driver {name} turns {turns:.3g} times, expected {MOST_TURNS} at most"
-            raise fault(file, "", f'{problem}; correct its unit by {MAP} "{name}=COLUMN [UNIT]"')
+            raise fault(file, "", f'{problem}. Correct its unit by {MAP} "{name}=COLUMN [UNIT]"')
     notes = [f"{file}: driver {name} {each.source}" for name, each in followed.items()]
     if time is not None and lead not in followed:
         rate = 1.0 if timed else sweep.rate
@@ -128,7 +128,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
         return _with_sweep(Resampled(case, True, [moved], notes, TIME, found), found)
     if lead not in followed:
         problem = f"found no motion of a driver, expected time, the driver {lead}, or the poses"
-        raise fault(file, "", f'{problem} of its bodies; say {MAP} "{lead}=COLUMN"')
+        raise fault(file, "", f'{problem} of its bodies. Say {MAP} "{lead}=COLUMN"')
     drive, alone = followed[lead], len(followed) == 1
     rates = alone and not timed and _at_own_rate(drive, time, sweep.rate)
     column = lead if alone and lead in samples.numbers else ""
@@ -142,11 +142,11 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
     lacking = [] if timed else [name for name in sweep.motions if name not in followed]
     if lacking:
         problem = f"found no motion of the driver {lacking[0]}, expected that of all"
-        raise fault(file, "", f'{problem}; say {MAP} "{lacking[0]}=COLUMN"')
+        raise fault(file, "", f'{problem}. Say {MAP} "{lacking[0]}=COLUMN"')
     times = np.arange(float(samples.count)) if time is None else time.values
     if samples.count < 2 or not (np.diff(times) > 0.0).all():
         expected = "expected several, in order of time, where drivers follow the recording"
-        raise fault(file, "", f"found samples whose time does not increase, {expected}; sort them")
+        raise fault(file, "", f"found samples whose time does not increase, {expected}. Sort them")
     rated = time is not None and all(len(each.orders) == 3 for each in followed.values())
     found = Sweep(TIME, times, motions=_motions(case, times, followed, {}))
     variants = [

@@ -214,7 +214,7 @@ other side | (left_toe.*?side = )"left" | \\1"middle"
 no other | \\[suspension.other.*?(?=\\[outputs) |
     | outputs.right_toe.side ... found 'right' ... expected left ... add [suspension.other]
 no other for an axle | \\[suspension.other.*(?=\\[outputs.track) |
-    | suspension.other: missing ... outputs.track of type 'track' ... add [suspension.other]
+    | suspension.other: missing ... outputs.track of type 'track' ... Add [suspension.other]
 one wheel twice | (other.*?center = )"right | \\1"left
     | suspension.other.side ... 'right' ... on the other side
 no point | (other.*?)right_wheel_center | \\1right_wheel_centre
@@ -236,7 +236,7 @@ def test_roll_centre_needs_both_travel_drivers(tmp_path):
     points = r'point = "(left|right)_wheel_center"', r'point = "\1_tierod_outer"'
     outputs = r"\[outputs.*", '[outputs.rc]\ntype = "axle_roll_center_height"\n'
     file = changed(tmp_path, points, (r'travel = "\w+_stroke"\n', ""), outputs)
-    with pytest.raises(CaseError, match=r"outputs\.rc: .* name them by suspension\.travel and"):
+    with pytest.raises(CaseError, match=r"outputs\.rc: .* Name them by suspension\.travel and"):
         load_case(file)
 
 
@@ -449,7 +449,7 @@ def test_several_corners_need_corner_option(tmp_path):
         CaseError, match=r"--corner FL: .* front left, front right, rear left, rear right"
     ):
         load(file, of("mcpherson"))
-    with pytest.raises(CaseError, match="expected left; choose"):
+    with pytest.raises(CaseError, match=r"expected left\. Choose"):
         load(file, of("mcpherson", corner="left"))
 
 

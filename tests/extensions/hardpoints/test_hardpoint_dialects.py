@@ -202,21 +202,21 @@ thousands of the Swiss | -611.75 | -1'611.75 | separators of thousands
 below no head | 228.25 | 228;25 | line 10 ... found 5 fields
 points above the head | name;x | lca_front;1;2;3\\nname;x
     | line 1 ... expected the head ... above the points
-row of two units | y;z | y;z\\n;mm;mm;m | line 2 ... name the point
+row of two units | y;z | y;z\\n;mm;mm;m | line 2 ... Name the point
 unknown unit | x;y;z | x [furlong];y [furlong];z [furlong] | unit ... 'furlong'
 sign of one y | -219.75 | 219.75
-    | tierod_inner ... y = 219.75 mm ... on the other side than wheel_center ... correct its
+    | tierod_inner ... y = 219.75 mm ... on the other side than wheel_center ... Correct its
 formula | -611.75 | =A1+1 | line 10: wheel_center: y ... '=A1+1' ... save the
 error of a formula | -611.75 | #REF! | line 10: wheel_center: y ... '#REF!'
-unit in a cell | -611.75 | -611.75 mm | '-611.75 mm' ... leave the unit out
-fraction | -611.75 | -611 3/4 | '-611 3/4' ... correct the number
-letter O | -611.75 | -61O.75 | '-61O.75' ... correct the number
+unit in a cell | -611.75 | -611.75 mm | '-611.75 mm' ... Leave the unit out
+fraction | -611.75 | -611 3/4 | '-611 3/4' ... Correct the number
+letter O | -611.75 | -61O.75 | '-61O.75' ... Correct the number
 NaN | -611.75 | NaN | 'NaN'
 infinite | -611.75 | inf | 'inf'
 dash for nothing | -611.75 | - | line 10: wheel_center: y ... '-'
 date | -611.75 | 2026-05-01 | '2026-05-01' ... took the number for a date
 hexadecimal | -611.75 | 0x1F | '0x1F'
-point without numbers | 0.25;-611.75;228.25 | ;; | line 10 ... complete the
+point without numbers | 0.25;-611.75;228.25 | ;; | line 10 ... Complete the
 missing point | wheel_center;0.25;-611.75;228.25\\n | | missing wheel_center, the wheel's centre
 twice, equal | 228.25 | 228.25\\nwheel_center;0.25;-611.75;228.25 | given before, in line 10
 twice, named otherwise | 228.25 | 228.25\\nWheel Centre;0;-600;228.25 | 'Wheel Centre' (line
@@ -247,7 +247,7 @@ FAULTS = {
     "line 4 ... decimal comma needs semicolons": (
         WITH_MASS.replace("15.25,-539.75,312.25,3", "15,25,-539,312,")
     ),
-    "line 4 ... complete the row": WITH_MASS.replace("15.25,-539.75,312.25,3", "15,-539,312"),
+    "line 4 ... Complete the row": WITH_MASS.replace("15.25,-539.75,312.25,3", "15,-539,312"),
     "line 1 ... 'x' twice": table("name;x [mm];y [mm];z [mm];x [m]", "{};{};{};{};1"),
     "is not UTF-16": table().encode("utf-16")[:-1],
     "line 10 ... separators of thousands": table().replace("-611.75", "-1\u202f611.75"),
@@ -257,7 +257,7 @@ FAULTS = {
     ),
     "span ... metres declared as mm?": table(points=METRES),
     "line 1 ... expected the head": table(row="{};1;{};{};{}").partition("\n")[2],
-    "a second head ... keep one": table() + "\n" + table(),
+    "a second head ... Keep one": table() + "\n" + table(),
     "expected the head name,x,y,z": "name;x;y\nwheel;1;2\n",
     "line 1 ... expected the head name,x,y,z": "x\n1\n",
     "expected the head": '{"wheel_center": [0, 1, 2]}',

@@ -70,13 +70,13 @@ FAULTS = """
 angle | wheel_radius=30deg | | --wheel-radius ... '30deg' ... a length
 radius in mm | wheel_radius=300 |
     | --wheel-radius ... 300 m ... 0.02 to 3 m ... say its unit: 300mm
-negative radius | wheel_radius=-0.3 | | found -0.3 m ... correct it
+negative radius | wheel_radius=-0.3 | | found -0.3 m ... Correct it
 wheelbase in mm | wheelbase=2600 | | --wheelbase ... 0.1 to 20 m ... 2600mm
 height in mm | cg_height=500 | | --cg-height ... 0.005 to 6 m ... 500mm
 rack in mm | rack_per_turn=50 | | --rack-per-turn ... 0.001 to 1 m ... 50mm
 radius and contact | wheel_radius=0.3 | wheel_contact,0,612,0 | --wheel-radius ... wheel_contact
 contact at centre | | wheel_contact,0,612,220 | wheel_contact ... 0.008 m
-axis inboard | | wheel_axis,0,412,228 | wheel_axis ... inboard ... mirror
+axis inboard | | wheel_axis,0,412,228 | wheel_axis ... inboard ... Mirror
 """
 
 

@@ -286,7 +286,7 @@ drive | | | drive=a:0:1 | --drive ... hardpoint table
 cut row | 417,-750,330 | 417,-750 | | line 6 ... found 3 fields ... expected 4
 no number | 417,-750,330 | 417,-75O,330 | | line 6 ... tierod_outer ... y ... '-75O'
 digit separators | 417,-750,330 | 417,-7_50,330 |
-    | line 6 ... tierod_outer ... y ... '-7_50' ... correct
+    | line 6 ... tierod_outer ... y ... '-7_50' ... Correct
 other digits | 417,-750,330 | 417,-７５０,330 | | line 6 ... tierod_outer ... y ... '-７５０'
 not finite | 417,-750,330 | 417,nan,330 | | line 6 ... tierod_outer ... 'nan'
 twice | lca_rear | lca_front | | line 4 ... lca_front ... line 2
@@ -298,7 +298,7 @@ two units | name,x,y,z | name,x [mm],y [mm],z [m] | | line 1 ... one unit
 unit contradicts | name,x,y,z | name,x [m],y [m],z [m] | | --units ... found mm ... in m
 remark contradicts | name,x,y,z | # units: m\\nname,x [mm],y [mm],z [mm] |
     | line 2 ... in mm, and m
-no name | lca_rear | | | line 4 ... name the point
+no name | lca_rear | | | line 4 ... Name the point
 """
 
 

@@ -135,7 +135,7 @@ def test_python_form_is_read(tmp_path, form):
 @pytest.mark.parametrize("form", ["front of two", "front of two variables"])
 def test_python_two_axles_are_refused(tmp_path, form):
     (tmp_path / "points.py").write_text(SCRIPTS[form])
-    with pytest.raises(CaseError, match="choose a section by --sheet NAME"):
+    with pytest.raises(CaseError, match="Choose a section by --sheet NAME"):
         load(tmp_path / "points.py", Supplied("double_wishbone", "mm", "iso"))
 
 

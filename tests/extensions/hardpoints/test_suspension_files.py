@@ -37,7 +37,7 @@ ON_CHASSIS = changed(wheel_center="top") | {"points": POINTS}
 WRONG = {
     "mirrored hardpoints": (
         changed(side="left"),
-        "suspension.side ... 'left' ... 0.715 m on the other side ... correct side",
+        "suspension.side ... 'left' ... 0.715 m on the other side ... Correct side",
     ),
     "another convention": (
         changed(convention="din"),
@@ -51,7 +51,7 @@ WRONG = {
     ),
     "leaning up": (
         changed(up=[0.1, 0, 1]),
-        "suspension.up ... right angles to forward ... correct one",
+        "suspension.up ... right angles to forward ... Correct one",
     ),
     "no such wheel": (
         changed(wheel_center="wheel"),
@@ -84,7 +84,7 @@ WRONG = {
     ),
     "kingpin beside links": (
         changed(kingpin_links=RODS * 4),
-        "kingpin_links: found beside kingpin, ... remove",
+        "kingpin_links: found beside kingpin, ... Remove",
     ),
     "no such link": (
         changed(kingpin=None, kingpin_links=[*RODS * 3, ["strut_tip", "strut_foot"]]),
@@ -100,7 +100,7 @@ WRONG = {
     ),
     "no table": (
         {key: value for key, value in STRUT.items() if key != "suspension"},
-        "suspension: missing ... add [suspension]",
+        "suspension: missing ... Add [suspension]",
     ),
     "unknown type": (
         STRUT | {"outputs": {"toe": {"type": "tow"}}},

@@ -129,7 +129,7 @@ def test_sheet_option_chooses_hardpoints(tmp_path, plain, capsys):
 
 NO_NUMBERS = {
     "a date": (datetime(2026, 5, 1), "'2026-05-01 00:00:00' ... took the number for a date"),
-    "an error": ("#DIV/0!", "'#DIV/0!' ... correct the number"),
+    "an error": ("#DIV/0!", "'#DIV/0!' ... Correct the number"),
     "a truth": (True, "'True'"),
     "an empty cell": (None, "''"),
 }

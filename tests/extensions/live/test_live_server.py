@@ -238,12 +238,12 @@ def test_live_case_follows_page(car):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("nan", "found 'nan', expected a coordinate; correct the number"),
-        ("1e400", "found '1e400', expected a coordinate; correct the number"),
-        ("", "found '', expected a coordinate; correct the number"),
-        ("12 mm", "leave the unit out, and state it in the head or by --units"),
-        ("1 200", "remove the separators of thousands"),
-        ("=A1", "write the value of the formula"),
+        ("nan", "found 'nan', expected a coordinate. Correct the number"),
+        ("1e400", "found '1e400', expected a coordinate. Correct the number"),
+        ("", "found '', expected a coordinate. Correct the number"),
+        ("12 mm", "Leave the unit out, and state it in the head or by --units"),
+        ("1 200", "Remove the separators of thousands"),
+        ("=A1", "Write the value of the formula"),
     ],
 )
 def test_typed_text_message_equals_file(page, car, text, told):

@@ -208,7 +208,7 @@ def test_fmu_without_description_is_refused(last_record, tmp_path, capsys):
     case.write_text(CASE)
     file.write_bytes(b"PK")
     assert last_record(case, "--fmu", file, jobs=None)[0] == 2
-    assert "expected an FMU; export it anew" in capsys.readouterr().err
+    assert "expected an FMU. Export it anew" in capsys.readouterr().err
 
 
 def test_fmu_zip_bomb_is_refused(last_record, tmp_path, capsys):

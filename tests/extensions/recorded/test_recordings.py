@@ -185,7 +185,7 @@ REFUSED = {
     "MotionSolve": ("a.abf", b"\0", "of MotionSolve; in HyperGraph, export the curves as CSV"),
     "Simpack": ("a.sbr", b"\0", "Simpack; in its PostProcessor, export the channels as CSV"),
     "requests": ("a.req", b"\0", "a request file of Adams; say RESULTS/XRF in the deck"),
-    "level 7.3": ("a.mat", b"MATLAB 7.3 MAT-file", "of version 7.3; in MATLAB: save"),
+    "level 7.3": ("a.mat", b"MATLAB 7.3 MAT-file", "of version 7.3. In MATLAB: save"),
     "no MAT-file": ("a.mat", b"junk" * 99, "found no readable MAT-file"),
     "no driver": ("a.csv", "time,z\n0,1\n", "the columns 'time', 'z', expected one of MOTION_1"),
     "two analyses": (
@@ -338,6 +338,16 @@ def test_slip_in_recording_is_named(judged, table, options, change, text):
     status, record = judged(table("fourbar_angles.csv", change), *options)
     assert status == 1
     assert text in record["message"]
+
+
+@pytest.mark.parametrize("said", ["rocker-90 [deg]", "-rocker+90.0 [rad]"])
+def test_slip_names_option_that_states_it(judged, said):
+    """A wrong sign and a wrong unit of an output; with the option the recording is right."""
+    options = [*RIGHT[:3], f"JOINT_4.angle={said}"]
+    status, record = judged(DATA / "fourbar_angles.csv", *options)
+    (stated,) = re.findall(r'If it is meant, say --map "([^"]*)"', record["message"])
+    assert status == 1
+    assert judged(DATA / "fourbar_angles.csv", *RIGHT[:2], "--map", stated)[0] == 0
 
 
 def test_map_offset_has_a_unit(judged):
@@ -529,4 +539,4 @@ def test_long_csv_of_two_cases(judged, kincheck_main, tmp_path, capsys):
     options = ["--csv", file, "--long", "--quiet"]
     kincheck_main("run", CASE, "crank", *options, engines=[NATIVE])
     assert judged(file)[0] == 2
-    assert "'crank', expected one; write a file for each" in capsys.readouterr().err
+    assert "'crank', expected one. Write a file for each" in capsys.readouterr().err

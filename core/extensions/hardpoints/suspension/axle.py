@@ -263,7 +263,7 @@ class _AxleRollCenter(AxleOutput):
         if self.vehicle.travel:
             return ""
         return (
-            f"found {self.type!r} without a driver of each wheel's travel, expected both; name them"
+            f"found {self.type!r} without a driver of each wheel's travel, expected both. Name them"
             " by suspension.travel and suspension.other.travel"
         )
 

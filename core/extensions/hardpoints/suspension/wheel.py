@@ -126,7 +126,7 @@ class _Shift(Change):
         if self.at is Place.WHEEL_CENTER or self.vehicle.wheel_radius is not None:
             return ""
         return (
-            "found no wheel_radius in [suspension], expected it for the contact centre; add it, or"
+            "found no wheel_radius in [suspension], expected it for the contact centre. Add it, or"
             ' at = "wheel_center"'
         )
 
@@ -410,7 +410,7 @@ class _Anti(Rate):
         if self.vehicle.axle is self.axle:
             return ""
         return (
-            f"found {self.type!r} of a {self.vehicle.axle} axle, expected a {self.axle} one; remove"
+            f"found {self.type!r} of a {self.vehicle.axle} axle, expected a {self.axle} one. Remove"
             " it, or correct suspension.axle"
         )
 
