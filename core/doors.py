@@ -46,6 +46,7 @@ class Extension:
             "native" and "projection"; see `harness.engine.Balancing`.
         simulations: function without arguments for each engine in simulate mode.
         readers: readers of files; see `case.io.readers.Reader`.
+        compilers: compiler of plans to machine code; see `program.executor.Compiler`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
         sources: options added to commands with engines; see `cli.engine_source.EngineSource`.
@@ -69,6 +70,7 @@ class Extension:
     equilibria: _Table = field(default_factory=dict[str, str])
     simulations: _Table = field(default_factory=dict[str, str])
     readers: _Table = field(default_factory=dict[str, str])
+    compilers: _Table = field(default_factory=dict[str, str])
     methods: _Table = field(default_factory=dict[str, str])
     sections: _Table = field(default_factory=dict[str, str])
     sources: _Table = field(default_factory=dict[str, str])

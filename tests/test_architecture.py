@@ -43,7 +43,7 @@ IMPORTS = {
         ". case case/io case/models harness harness/workers history joints kinematics "
         "program report studies studies/checks"
     ),
-    "harness": ". case case/io joints kinematics mechanism program/llvm",
+    "harness": ". case case/io joints kinematics mechanism program",
     "harness/reporting": "",
     "harness/workers": ". harness",
     "history": ". case case/io harness",
@@ -57,7 +57,7 @@ IMPORTS = {
     "kinematics/assembly": ". kinematics/compiled kinematics/formulation mechanism primitives",
     "kinematics/compiled": (
         ". joints kinematics/forces kinematics/formulation kinematics/structure mechanism "
-        "primitives program program/llvm"
+        "primitives program"
     ),
     "kinematics/continuation": (
         ". kinematics/compiled kinematics/formulation kinematics/structure mechanism program"
@@ -68,7 +68,6 @@ IMPORTS = {
     "mechanism": ". joints",
     "primitives": ". program",
     "program": ".",
-    "program/llvm": ". program",
     "report": ". case case/io harness history joints mechanism",
     "studies": ". case case/io harness mechanism",
     "studies/checks": (

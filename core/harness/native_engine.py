@@ -9,7 +9,7 @@ from typing import Any
 
 from ..case.case import Case
 from ..kinematics import LAST_ITERATION, NATIVE, NativeSolver, ProgramSize, Solver
-from ..program.llvm.machine_code import available
+from ..program.executor import compiler
 from ..trajectory import Trajectory, shown
 from ..version import VERSION
 from .engine import STANDARD, equilibria_of
@@ -40,7 +40,7 @@ class NativeEngine:
     @property
     def loop(self) -> str:
         """Place of Newton's loop over the samples: machine code, if a compiler is available."""
-        return "compiled" if self.solver.compiled and available() else "python"
+        return "compiled" if self.solver.compiled and compiler() else "python"
 
     @property
     def settings(self) -> Mapping[str, Any]:

@@ -1,12 +1,11 @@
-"""Programs: from an equation to machine code.
+"""Programs: from an equation to a list of operations, and its execution.
 
 1. `tape`: run an equation on traced scalars (`Traced`). A `Tape` records each operation once and
    folds literal zeros, ones and signs. `jacobian` traces the derivatives by the chain rule.
 2. `elimination`: trace the solution of a linear system. Literal and lone pivots come first, then
    dense cores with partial pivoting by compare-and-select.
 3. `straight_line`: collect the operations of some outputs into a `Program`. `Prepared` moves terms
-   of the geometry alone into a program of its own. `lower` fuses products and sums, so compiled
-   and interpreted programs give equal bits; `bytecode` runs without compilation.
+   of the geometry alone into a program of its own.
 4. `plan`: a `Plan` names the programs of a model, the slots of a lane, and the order of an attempt:
    predict, iterate Newton, test. An executor binds it to lanes; a track follows one motion.
 
@@ -14,23 +13,12 @@ Executors:
 
 - `numpy_executor`: one ufunc call per operation over all lanes. No start-up cost; the oracle of the
   tests. `NumpyExecutor` and `NumpyTrack` describe what every executor does.
-- `llvm.executor`: machine code over vectors of lanes, one call per motion.
-- `ball_executor`: ball arithmetic with proven error bounds; one lane, programs without a plan.
+- `executor`: what each executor does; machine code by the compiler of an extension, or numpy.
 
-From a plan to machine code:
-
-- `llvm.programs`: schedule a program, assign registers, and write LLVM text; the interpreter of
-  tables.
-- `llvm.loops`: loops over lanes as LLVM text, the same for all plans. `llvm.plan` lays out a plan
-  in memory for them, with the loops over its tables.
-- `llvm.fixed_order`: sparse LU factors of several matrices at once, as loops over lists of places.
-- `llvm.compiler`: compile the text, link the object file, and load it.
-- `llvm.jit`: choose cached code, interpretation or compilation for a plan.
-- `llvm.machine_code`: whether llvmlite does all this here; numpy takes over where it does not.
-- `disk_cache`: keep machine code, tables and traced programs on disk.
+`disk_cache` keeps traced programs on disk, and what an extension makes of them.
 
 A mechanism's program is described once, in `core.kinematics.compiled`: `Tracing` names the slots of
-its lanes and holds its `Plan`, `Model` makes code of the plan, and an executor binds it to lanes.
+its lanes and holds its `Plan`, `Model` makes the plan ready, and binds it to lanes.
 `core.caches` keeps recent models for the process, and bound lanes for each thread.
 """
 

@@ -4,10 +4,8 @@ them; the data of executors.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +18,6 @@ DONE, ITERATIONS, MARGIN = "done", "iterations", "margin"
 """Slots of an attempt: whether Newton converged, the number of iterations, and the acceptance
 margin.
 """
-LINE = 8
-"""Numbers in a cache line."""
 
 
 @dataclass(frozen=True)
@@ -169,19 +165,3 @@ class Parts:
     world: Array
     base: int
     worst: Array
-
-
-BYTES = 8
-"""Bytes of a number."""
-
-
-def aligned(count: int) -> Array:
-    """Return an array that starts at a cache line, so no vector crosses two lines."""
-    room = np.empty(count + LINE)
-    start = -(address(room) // BYTES) % LINE
-    return room[start : start + count]
-
-
-def address(array: NDArray[Any]) -> int:
-    """Return the address of a contiguous array; four times faster than its own `ctypes`."""
-    return ctypes.addressof(ctypes.c_char.from_buffer(array.data))

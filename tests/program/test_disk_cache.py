@@ -9,6 +9,14 @@ from pathlib import Path
 import pytest
 from kincheck.core.program import disk_cache
 
+
+@pytest.fixture
+def cache_folder(monkeypatch, tmp_path):
+    """The folder of a cache of the test's own, which is not there yet."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "kincheck"
+
+
 DAY = 86400.0
 
 

@@ -6,6 +6,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
+    needs=["llvm"],
     methods={
         "by size": "method:by_size",
         "component by component": "method:by_components",

@@ -38,8 +38,8 @@ from ...kinematics.structure.degrees_of_freedom import freedom_account
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import Parts, Plan
-from ...program.plan import aligned
 from ...trajectory import QUANTITIES, Array
+from ..llvm.plan import aligned
 from .sparse_lanes import SparseLanes
 from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 

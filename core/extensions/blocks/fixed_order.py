@@ -14,10 +14,10 @@ from heapq import heapify, heappop, heappush
 import numpy as np
 from numpy.typing import NDArray
 
-from ...program.llvm.jit import Code, load
-from ...program.llvm.programs import Lines, declarations
-from ...program.plan import BYTES, LINE, address, aligned
 from ...trajectory import Array
+from ..llvm.jit import Code, load
+from ..llvm.plan import BYTES, LINE, address, aligned
+from ..llvm.programs import Lines, declarations
 
 LANES = LINE
 """Matrices at once."""

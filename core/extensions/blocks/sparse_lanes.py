@@ -48,6 +48,8 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import before, maximum
 from ...trajectory import Array
+from ..llvm.machine_code import works
+from .elements import LargeSystem
 from .sparse_lu import Blocks, FactorsOfLanes, Pattern, SingularError
 from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 
@@ -204,7 +206,8 @@ class SparseLanes(Lanes):
         self.mechanism, self.request = mechanism, request
         extent, frame = measured(mechanism)
         self.unit = frame.unit
-        self.system = System(Tracer(mechanism, request, frame=frame), compiled=request.compiled)
+        system = LargeSystem if request.compiled and works() else System
+        self.system = system(Tracer(mechanism, request, frame=frame))
         # what a change of the state is measured by: lengths by the mechanism's size
         self._scale = np.ones((len(self.system.design), 1))
         for name, at in self.system.names.items():

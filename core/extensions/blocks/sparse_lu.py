@@ -21,8 +21,8 @@ import numpy as np
 
 from ...caches import cache_last
 from ...kinematics.structure.degrees_of_freedom import NARROW, Indices
-from ...program.llvm.machine_code import available
 from ...trajectory import Array
+from ..llvm.machine_code import works
 from .fixed_order import LANES, FixedOrder, load_loops
 
 GROWTH = 50.0
@@ -78,7 +78,7 @@ class Pattern:
         )
         self._at, self._entries = at, at[self._matrix.data.astype(np.intp)]
         self._places, self._orders = (rows, columns, n), list[_Order]()
-        if values is not None and available(load_loops):
+        if values is not None and works(load_loops):
             self._reorder(self._factor_or_none(values))
         self.begin()
 

@@ -23,7 +23,7 @@ from ...harness.provenance import circumstances
 from ...harness.record import Outcome
 from ...harness.run import run
 from ...program import disk_cache
-from ...program.llvm import compiler, machine_code
+from ...program.executor import compiler
 
 SCHEMA = "kincheck-doctor/1"
 # Extras of the package and their purposes, except engines. Requirements without an extra are
@@ -128,7 +128,7 @@ class Examination(msgspec.Struct, frozen=True):
 
 def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) -> Examination:
     """Examine the installation, with the named engines, and solve a case with the native engine."""
-    problem, compiled = _cache_problem(), machine_code.available()
+    problem, compiled = _cache_problem(), compiler()
     (record,) = run([case], [native], tol=tol).records
     found = [each.position for each in record.errors.values() if each.position is not None]
     worst = max(found, key=lambda each: each.ratio, default=None)
@@ -152,7 +152,7 @@ def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) ->
             if compiled
             else "numpy: with llvmlite that works it is some fifty times faster"
         ),
-        compiler.vector_width() if compiled else None,
+        compiled.width if compiled else None,
         str(disk_cache.folder() or "nowhere"),
         0 if problem else disk_cache.size(),
         problem,
@@ -262,8 +262,8 @@ def _with_import_problems(
     for part in found:
         unusable = _import_problem(running[part.name]) if part.name in running else ""
         problem = unusable or part.problem
-        if part.name == "llvmlite" and part.version and not problem:
-            problem = machine_code.problem()
+        if part.version and not problem and (offer := offers("compilers").get(part.name)):
+            problem = offer.load().problem()
         remedy = part.remedy or (_repair(part.name, problem) if problem else "")
         result.append(msgspec.structs.replace(part, problem=problem, remedy=remedy))
     return result

@@ -35,9 +35,7 @@ from ...mechanism.mechanism import Mechanism, coordinates
 from ...mechanism.motions import Driver
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive
 from ...program import Plan, Tape
-from ...program.llvm.executor import bind
-from ...program.llvm.jit import LlvmCode
-from ...program.llvm.machine_code import available
+from ...program.executor import ready
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory
 
 # Singular values below this part of the largest are zero, as for `structure.redundancy`.
@@ -125,7 +123,7 @@ class FreeEquations:
             "power": [sum(power, 0.0)],
         }
         plan = Plan({"free": layout.program("free", tape, wanted)}, layout.slots)
-        self._executor = bind(plan, 1, LlvmCode(plan) if available() else None)
+        self._executor = ready(plan)(1)
         self._outputs = slots_of(layout.vectors, wanted)
         ends = [0, *np.cumsum([len(values) for values in wanted.values()]).tolist()]
         self._parts = [slice(*each) for each in pairwise(ends)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields, replace
 from pathlib import Path
 from time import perf_counter
@@ -22,7 +21,7 @@ from ...harness.labels import output_label
 from ...harness.provenance import case_facts
 from ...harness.scene import scene
 from ...kinematics import places, require_driven
-from ...program.llvm.machine_code import available
+from ...program.executor import compiled_at_once
 from ...report.axis import DISPLAY, Axis, driver_axis
 from ...report.drawing import drawing
 from ...trajectory import Array
@@ -274,12 +273,7 @@ class LiveTable(LiveFile):
 
     def _prepare(self, case: Case) -> DesignOutputs:
         """Return the program of a case, compiled."""
-        at_once: AbstractContextManager[None] = nullcontext()
-        if available():
-            from ...program.llvm.jit import compiled_at_once
-
-            at_once = compiled_at_once()
-        with at_once:  # otherwise an edit in between waits for the compiler
+        with compiled_at_once():  # otherwise an edit in between waits for the compiler
             bodies = [body.name for body in case.mechanism.moving]
             ready = DesignOutputs.of(without_forces(case), places(case.mechanism), bodies=bodies)
             ready.solve(geometry_of(case))

@@ -48,7 +48,7 @@ from ...program import (
     absolute,
     maximum,
 )
-from ...program.llvm.executor import Executor
+from ...program.executor import Executor
 from ...program.tape import folded, jacobian
 from ...trajectory import Array
 

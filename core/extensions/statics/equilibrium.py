@@ -34,9 +34,7 @@ from ...kinematics.formulation.constraints import constraints_left_out
 from ...kinematics.formulation.state_vectors import columns_of, dense, placed_bodies
 from ...mechanism.mechanism import Mechanism, Point
 from ...primitives.base import Drive, Pose
-from ...program.llvm.executor import Executor, bind
-from ...program.llvm.jit import LlvmCode
-from ...program.llvm.machine_code import available
+from ...program.executor import Executor, ready
 from ...trajectory import Array, BodyMotion
 from .equations import (
     BY,
@@ -240,7 +238,7 @@ class StaticModel:
         names = [*self.equations.design, MULTIPLIERS]
         self._state = slots_of(vectors, names)
         self._tests = slots_of(vectors, (STEP, SIGNS, DETERMINANT))
-        self._code = LlvmCode(self.equations.plan) if available() else None
+        self._bind = ready(self.equations.plan)
         self._bound: dict[int, Executor] = {}
         # no walk changes the signs
         executor = self.executor(1)
@@ -252,7 +250,7 @@ class StaticModel:
         """Return the programs bound to lanes at design."""
         made = self._bound.get(lanes)
         if made is None:
-            made = self._bound[lanes] = bind(self.equations.plan, lanes, self._code)
+            made = self._bound[lanes] = self._bind(lanes)
         for name in (REST, *(f"{LOAD}{each.name}" for each in self.equations.loads)):
             slots = self.equations.vectors[name]
             made.put(slots, np.zeros((len(slots), 1)))

@@ -276,13 +276,13 @@ def _part(options: Sweep, folder: Path) -> Part:
 
     from ...cli.joint_loading import sources
     from ...harness.provenance import processor
-    from ...program.llvm.machine_code import available
+    from ...program.executor import compiler
     from .chunk_files import Part
 
     facts: dict[str, Any] = {
         "kincheck": VERSION,
         "numpy": np.__version__,
-        "llvm": available(),
+        "llvm": compiler() is not None,
         "processor": processor(),
     }
     facts |= {"joints": sources(options.joint_type)}

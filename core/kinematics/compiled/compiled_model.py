@@ -27,10 +27,7 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import ITERATIONS, NODES, Plan, groups_behind
 from ...program.disk_cache import load_or_make
-from ...program.llvm import compiler
-from ...program.llvm.executor import Executor, bind
-from ...program.llvm.jit import LlvmCode
-from ...program.llvm.machine_code import available
+from ...program.executor import Executor, compiler, ready
 from ...trajectory import Array
 from ..formulation.constraints import Frames
 from ..formulation.state_vectors import samples
@@ -98,8 +95,8 @@ def load_or_trace(mechanism: Mechanism, request: Request, alike: Alike | None = 
     Raises:
         SolveError: drivers and degrees of freedom do not match.
     """
-    compiled = request.compiled and available()
-    lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
+    compiled = compiler() if request.compiled else None
+    lanes = compiled.width if compiled else NODES  # numpy's are as many or more
     own = is_builtin(mechanism) and request.style in (NATIVE, MIXED)
     if alike or request.varied or not (own and compiled):
         return _trace(mechanism, request, alike, lanes)
@@ -265,8 +262,7 @@ class Model(Tracing):
         self.mechanism, self.request = mechanism, request
         self.programs, self.slots = self.plan.programs, self.plan.slots
         self.geometry, self.kept = slots_of(self.vectors, self.varied), len(self.plan.kept)
-        compiled = self.request.compiled and available()
-        self._code = LlvmCode(self.plan) if compiled else None
+        self._bind = ready(self.plan, compiled=request.compiled)
         self.thread_cache = ThreadCache()
         self.design = np.full(len(self.slots), np.nan) if request.rows else self._solve_design()
 
@@ -312,7 +308,7 @@ class Model(Tracing):
         Every caller with the same number of lanes gets the same memory, and sets every slot it
         reads.
         """
-        return self.thread_cache(lanes, lambda: bind(self.plan, lanes, self._code))
+        return self.thread_cache(lanes, lambda: self._bind(lanes))
 
     def samples(self, path: Path, times: Array) -> Array:
         """Return the values of the slots `sampled` at times of a path, shape (sampled, n)."""

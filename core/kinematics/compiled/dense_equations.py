@@ -6,9 +6,9 @@ beyond limits of travel, mechanisms too large for such a program. Many poses at 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -17,20 +17,17 @@ from numpy.typing import NDArray
 from ...algebra import Scalar
 from ...mechanism.motions import Path
 from ...primitives.base import Twist
-from ...program import Plan, Program, program
-from ...program.llvm.compiler import vector_width
-from ...program.llvm.executor import Executor, bind
-from ...program.llvm.jit import LlvmCode
-from ...program.llvm.machine_code import available
-from ...program.straight_line import bytecode
+from ...program import NumpyExecutor, Plan, Program, program
+from ...program.executor import Bind, Executor
 from ...trajectory import Array
 from ..formulation.formulation import Configuration
 from ..formulation.state_vectors import samples
-from ..formulation.styles import NATIVE
-from .compiled_model import Model, is_builtin
-from .elements import AFTER, GEOMETRY, Elements
+from .compiled_model import Model
 from .programs import Tracer
 from .request import FROM, RATE, RATE_T, TIME, kept_forces, kept_motions
+
+GEOMETRY = "geometry"
+"""The vector of numbers of the geometry."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,19 +79,23 @@ class System:
     A state is one column of numbers [units, rad, -]. Values of the drivers come from a sample, see
     `Model.samples`.
 
-    Args:
-        compiled: run by machine code if llvmlite is installed: interpreted, because it takes longer
-            to compile so many operations than they ever run.
-
     Attributes:
         conditions: see `Cartesian`.
         unknowns: n.
         names: by vector of the state, its numbers in a state.
         rows, columns: of the entries of the Jacobian.
         sizes: operations and flops of each program.
+        geometry: values of the vector `GEOMETRY` of programs that read numbers of the geometry.
+        after: before the names of the vectors of a state after a step.
     """
 
-    def __init__(self, tracer: Tracer, *, compiled: bool = False) -> None:
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    sizes: dict[str, dict[str, int]]
+    geometry: Array = np.empty((0, 1))
+    after = ""
+
+    def __init__(self, tracer: Tracer) -> None:
         self.tracer = tracer
         formulation, vector = tracer.formulation, tracer.layout.vector
         self.unknowns, self.conditions = tracer.unknowns, formulation.conditions
@@ -106,30 +107,24 @@ class System:
             *(k for name in tracer.request.drivers for k in vector(f"drive {name}", 5)),
         ]
         outputs, self._executors = tracer.outputs_of_rates(), dict[int, Executor]()
-        compiled = compiled and available()
-        tables, self._geometry, after = None, np.empty((0, 1)), ""
-        native = tracer.request.style == NATIVE and is_builtin(tracer.mechanism)
-        if compiled and native:
-            found = Elements(formulation, tracer.layout, vector_width())
-            self.rows, self.columns, self.sizes = found.rows, found.columns, {**found.sizes}
-            self._geometry, after = found.geometry[:, None], AFTER
-            last = bytecode(outputs, len(tracer.layout.slots), vector_width())
-            tables = {**found.tables, outputs.name: last}
-            programs = [Program(name, (), {}) for name in found.tables]
-        else:
-            programs = self._trace_programs(names)
-            self.sizes = {each.name: each.size for each in programs}
+        self._plan, self._bind = self.ready(outputs)
         self.sizes[outputs.name] = outputs.size
         self._vectors = {name: _run(slots) for name, slots in tracer.layout.vectors.items()}
         self._state, self._after = (
             _run([slot for name in names for slot in vector(f"{label}{name}", 1)])
-            for label in ("", after)
+            for label in ("", self.after)
         )
-        plan = Plan({each.name: each for each in (*programs, outputs)}, tracer.layout.slots)
-        self._plan = plan
-        self._code = LlvmCode(plan, often=math.inf, tables=tables) if compiled else None
 
-    def _trace_programs(self, names: Mapping[str, Sequence[int]]) -> list[Program]:
+    def ready(self, outputs: Program) -> tuple[Plan, Bind]:
+        """Return the plan of all programs, the last one given, ready to be bound; set `rows`,
+        `columns`, `sizes` and `geometry`.
+        """
+        programs = self._trace_programs()
+        self.sizes = {each.name: each.size for each in programs}
+        plan = Plan({each.name: each for each in (*programs, outputs)}, self.tracer.layout.slots)
+        return plan, partial(NumpyExecutor, plan)
+
+    def _trace_programs(self) -> list[Program]:
         """Return the programs of all rows, of gamma and of a step."""
         tracer, vector = self.tracer, self.tracer.layout.vector
         formulation, at = tracer.formulation, tracer.at
@@ -144,7 +139,7 @@ class System:
         wanted: dict[str, dict[str, list[Scalar]]] = {
             "rows": {"phi": phi, "nu": nu, "entries": [x for row in every for x in row.values()]},
             "gamma": {"gamma": gamma},
-            "retract": {name: [*after[name]] for name in names},
+            "retract": {name: [*after[name]] for name in self.names},
         }
         return [
             program(
@@ -266,9 +261,9 @@ class System:
 
     def _executor(self, lanes: int) -> Executor:
         if lanes not in self._executors:  # kept: binding costs more than running
-            executor = self._executors[lanes] = bind(self._plan, lanes, self._code)
-            if len(self._geometry):
-                executor.put(self._vectors[GEOMETRY], self._geometry)
+            executor = self._executors[lanes] = self._bind(lanes)
+            if len(self.geometry):
+                executor.put(self._vectors[GEOMETRY], self.geometry)
         return self._executors[lanes]
 
     def _at(self, state: Array, sample: Array) -> Executor:

@@ -28,7 +28,7 @@ TOL = 1e-12
 
 def test_native_efforts_grow_in_precision(monkeypatch):
     # twice four predict to 3e-9
-    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)
+    monkeypatch.setattr("kincheck.core.extensions.llvm.compiler.vector_width", lambda: 8)
     case = cases.load("rssr")
     found = [
         each.entry for each in precision.contestants(case, adapters.engine("native").efforts(), TOL)

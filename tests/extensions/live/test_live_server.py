@@ -31,7 +31,6 @@ from kincheck.core.extensions.live.protocol import (
     Vary,
 )
 from kincheck.core.extensions.live.table import LiveTable
-from kincheck.core.program.llvm import jit
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -572,6 +571,7 @@ def test_live_export_files(page, kind, start):
 def test_live_edits_compile_nothing(car, tmp_path, monkeypatch, axle):
     """The first answer has compiled all that an edit runs: none waits for the compiler."""
     pytest.importorskip("llvmlite")
+    jit = pytest.importorskip("kincheck.core.extensions.llvm.jit")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))
     live = LiveTable(car, replace(TRAVEL, axle=axle))
     compiled = []

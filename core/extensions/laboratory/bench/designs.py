@@ -18,7 +18,7 @@ from ....case.case import Case, size
 from ....harness.compare import output_series
 from ....joints import Kind
 from ....kinematics import NativeSolver, PreparedDesigns, Variants, kinds, places
-from ....program.llvm.machine_code import available
+from ....program.executor import compiler
 from ....trajectory import PointMotion, Trajectory
 from ...sweep.sweep import sweep_designs
 from ...sweep.variation import Coordinate, Law, Mode, Variation
@@ -86,7 +86,7 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
             Batch(
                 case=case.name,
                 variants=count,
-                loop="compiled" if available() else "python",
+                loop="compiled" if compiler() else "python",
                 solved=reached / (n * count),
                 retried=found.retried,
                 error=_error(case, designs, found),

@@ -18,8 +18,7 @@ from ....harness.engine import Engine, Measurable
 from ....harness.labels import product
 from ....harness.native_engine import NativeEngine
 from ....harness.provenance import circumstances
-from ....program.llvm.jit import compiled_at_once
-from ....program.llvm.machine_code import available
+from ....program.executor import compiled_at_once, compiler
 from ....report.figures import Effort
 from ..paper.formulation import Formulation
 from .designs import Batch, StudyRate, measure_batches, measure_studies
@@ -121,7 +120,7 @@ def measure(
         KincheckError: a case has no reference, and none can be proved.
     """
     started, before = datetime.now(UTC), _load()
-    peak = prepare() if available() else None
+    peak = prepare() if compiler() else None
     found: dict[str, Any] = {}
     true = {name: with_truth(without_forces(case), tol) for name, case in cases.items()}
     native = any(isinstance(engine, NativeEngine) for engine in engines)
@@ -192,7 +191,7 @@ def _measure_work(
     work: dict[tuple[str, str], Work] = {
         key: each.work for key, each in entering.items() if each.work is not None
     }
-    if detailed and available():
+    if detailed and compiler():
         work["levels", ALONE] = loops_alone(case, tol)
     if peak is not None:
         work["peak", ""] = peak

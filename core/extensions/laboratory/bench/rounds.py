@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from ....program.llvm import compiler, jit
 from ....trajectory import Array
+from ...llvm import compiler, jit
 
 # Duration of a turn [s]: long against the clock's resolution, short against interruptions. Quick
 # work is repeated in a turn.

@@ -9,8 +9,8 @@ from time import sleep
 import numpy as np
 import pytest
 from kincheck.core import solve
-from kincheck.core.extensions.blocks.component_lanes import ComponentLanes
-from kincheck.core.extensions.blocks.sweep import BlockSweep
+from kincheck.core.extensions.llvm import jit as llvm
+from kincheck.core.extensions.llvm.jit import LlvmCode
 from kincheck.core.kinematics.compiled import compiled_model as models
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
@@ -21,10 +21,9 @@ from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import Plan, Program, Tape, program
-from kincheck.core.program.llvm import jit as llvm
-from kincheck.core.program.llvm.jit import LlvmCode
+from kincheck.core.program.executor import compiled_at_once
 
-from ..support.mechanisms import chain, four_bar, mcpherson
+from ...support.mechanisms import chain, four_bar, mcpherson
 from .test_bytecode import every_slot
 
 pytestmark = pytest.mark.usefixtures("no_programs_kept")
@@ -34,7 +33,7 @@ def test_sweep_is_equal_after_compilation():
     model = compile_model(mcpherson(), Request(("stroke",), ("wheel",)))
     route = Route(model, Path({"stroke": Ramp(1.0)}, np.linspace(-0.08, 0.08, 161)))
     first, *others = (follow(route, 1e-12).points["wheel"].position for _ in range(10))
-    assert not model._code.interpreted
+    assert not model._bind.args[0].interpreted
     for each in others:
         np.testing.assert_array_equal(each, first)
 
@@ -46,7 +45,7 @@ def test_single_sweep_is_interpreted():
         tuple(each.name for each in members) for members in (mechanism.points, mechanism.moving)
     )
     model = models.recent_model(mechanism, Request(("stroke",), points, bodies))
-    assert model._code.interpreted
+    assert model._bind.args[0].interpreted
 
 
 def test_many_designs_are_compiled():
@@ -56,21 +55,25 @@ def test_many_designs_are_compiled():
         compile_model(mechanism, request), Path({"stroke": Ramp(1.0)}, np.linspace(-0.05, 0.05, 41))
     )
     rod = np.array([[1.115], [0.665], [0.118]]) + np.linspace(0.0, 0.01, 17)
-    assert route.model._code.interpreted
+    assert route.model._bind.args[0].interpreted
     for _ in range(2):
         solve_variants(route, rod, 1e-12)
-    assert not route.model._code.interpreted
+    assert not route.model._bind.args[0].interpreted
 
 
 def test_many_components_are_compiled():
+    lanes = pytest.importorskip("kincheck.core.extensions.blocks.component_lanes")
+    walks = pytest.importorskip("kincheck.core.extensions.blocks.sweep")
     mechanism = chain(15)
     parts = components(mechanism, frames(mechanism))
-    cascade = ComponentLanes(mechanism, Request(("turn",), ()), parts)
+    cascade = lanes.ComponentLanes(mechanism, Request(("turn",), ()), parts)
     path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 65))
-    solver = BlockSweep(cascade, path)
-    assert all(kind.model._code.interpreted for kind in cascade.kinds)
+    solver = walks.BlockSweep(cascade, path)
+    assert all(kind.model._bind.args[0].interpreted for kind in cascade.kinds)
     solver.solve(1e-12)
-    assert not any(kind.model._code.interpreted for kind in cascade.kinds if len(kind.members) > 1)
+    assert not any(
+        kind.model._bind.args[0].interpreted for kind in cascade.kinds if len(kind.members) > 1
+    )
 
 
 def test_long_program_is_compiled_later():
@@ -97,10 +100,10 @@ def test_known_program_is_compiled_sooner():
 
 
 def test_compiled_at_once_context():
-    with llvm.compiled_at_once():
-        made = compile_model(mcpherson(), Request(("stroke",), ()))._code
+    with compiled_at_once():
+        made = compile_model(mcpherson(), Request(("stroke",), ()))._bind.args[0]
     assert not made.interpreted  # they have run: the design is solved
-    assert compile_model(four_bar(), Request(("turn",), ()))._code.interpreted
+    assert compile_model(four_bar(), Request(("turn",), ()))._bind.args[0].interpreted
 
 
 def test_interrupted_compilation_is_repeated(monkeypatch):

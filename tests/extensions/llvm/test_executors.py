@@ -9,6 +9,10 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from kincheck.core.extensions.llvm.executor import LlvmExecutor
+from kincheck.core.extensions.llvm.jit import OFTEN, LlvmCode
+from kincheck.core.extensions.llvm.machine_code import works
+from kincheck.core.extensions.llvm.plan import TOGETHER, PlanInMemory, in_order
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
 from kincheck.core.kinematics.compiled.routes import Route
@@ -16,18 +20,12 @@ from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import follow_samples, marcher
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import NODES, NumpyExecutor, Plan, Tape, absolute, before, program
-from kincheck.core.program.llvm.executor import LlvmExecutor
-from kincheck.core.program.llvm.jit import OFTEN, LlvmCode
-from kincheck.core.program.llvm.machine_code import available
-from kincheck.core.program.llvm.plan import TOGETHER, PlanInMemory, in_order
 
-from ..support.mechanisms import four_bar, mcpherson, slider_crank
+from ...support.mechanisms import four_bar, mcpherson, slider_crank
 
 COMPILED = [
     False,
-    pytest.param(
-        True, marks=pytest.mark.skipif(not available(), reason="llvmlite is not installed")
-    ),
+    pytest.param(True, marks=pytest.mark.skipif(not works(), reason="llvmlite is not installed")),
 ]
 TOL = 1e-12
 
@@ -92,7 +90,7 @@ def test_sweeps_of_one_model_are_independent(compiled):
         np.testing.assert_array_equal(now.acceleration, was[1])
 
 
-@pytest.mark.skipif(not available(), reason="llvmlite is not installed")
+@pytest.mark.skipif(not works(), reason="llvmlite is not installed")
 def test_route_keeps_no_results():
     route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33))
     found = follow(route, TOL)
@@ -218,7 +216,7 @@ def test_padding_of_carried_pairs_is_neutral(count):
     assert after(pairs) == after(table // (8 * width))
 
 
-@pytest.mark.skipif(not available(), reason="llvmlite is not installed")
+@pytest.mark.skipif(not works(), reason="llvmlite is not installed")
 def test_tables_are_cache_aligned():
     mechanism = mcpherson()
     model = compile_model(

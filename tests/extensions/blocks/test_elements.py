@@ -5,13 +5,14 @@ import pytest
 
 pytest.importorskip("llvmlite")
 from kincheck.core.case.joint_probe import probes
+from kincheck.core.extensions.blocks.elements import LargeSystem
 from kincheck.core.extensions.laboratory.bench.size import ring
 from kincheck.core.kinematics.compiled.dense_equations import System
 from kincheck.core.kinematics.compiled.programs import Tracer
 from kincheck.core.kinematics.compiled.request import Request
 
-from ..support.block_structures import chain_of_hinges, torus
-from ..support.mechanisms import gears
+from ...support.block_structures import chain_of_hinges, torus
+from ...support.mechanisms import gears
 
 LANES = 11
 """More than a vector has."""
@@ -41,7 +42,7 @@ def test_elements_match_whole_equations(mechanism):
     points = tuple(each.name for each in mechanism.points)
     bodies = tuple(each.name for each in mechanism.moving)
     request = Request(drivers, points, bodies)
-    systems = [System(Tracer(mechanism, request), compiled=compiled) for compiled in (True, False)]
+    systems = [each(Tracer(mechanism, request)) for each in (LargeSystem, System)]
     found, expected = (equations(each, len(drivers), np.random.default_rng(4)) for each in systems)
     for a, b in zip(found, expected, strict=True):
         # fused products are rounded once: some round-offs of the terms, below 100 here

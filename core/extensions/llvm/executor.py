@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TypeAlias
 
 import numpy as np
 
+from ...program.plan import Parts, Side
 from ...trajectory import Array
-from ..numpy_executor import NumpyExecutor
-from ..plan import BYTES, LINE, Parts, Plan, Side, address, aligned
 from .jit import LlvmCode
 from .loops import MOTION, SIDE
+from .plan import BYTES, LINE, address, aligned
 
 OUT, FORGET = (MOTION.index(each) for each in ("ptr out", "i64 forget"))
 REACHED = SIDE.index("i64 reached")
@@ -189,14 +188,6 @@ class LlvmTrack:
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
         """See `NumpyTrack`."""
         return self._follow[side][anew](at, stop)
-
-
-Executor: TypeAlias = NumpyExecutor | LlvmExecutor
-
-
-def bind(plan: Plan, lanes: int, code: LlvmCode | None) -> Executor:
-    """Return a plan bound to lanes, by its machine code or else by numpy."""
-    return LlvmExecutor(code, lanes) if code else NumpyExecutor(plan, lanes)
 
 
 def _places(slots: Sequence[int]) -> Sequence[int] | slice:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..plan import LINE
-from ..tape import NODES
+from ...program.tape import NODES
 from .plan import (
+    LINE,
     SIGN,
     all_lanes,
     call,

@@ -4,16 +4,16 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from kincheck.core.extensions.llvm import programs
+from kincheck.core.extensions.llvm.bytecode import lower
+from kincheck.core.extensions.llvm.programs import AT_ONCE, CYCLES, OTHERS, _Straight, reschedule
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.program import Tape, program
-from kincheck.core.program.llvm import programs
-from kincheck.core.program.llvm.programs import AT_ONCE, CYCLES, OTHERS, _Straight, reschedule
-from kincheck.core.program.straight_line import lower
 from kincheck.core.program.tape import LEAVES, operands
 
-from ..support.mechanisms import mcpherson
-from ..support.program_blocks import run_on
+from ...support.mechanisms import mcpherson
+from ...support.program_blocks import run_on
 
 
 def cycles(found):

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core.caches import clear_caches
+from kincheck.core.extensions.llvm import jit
+from kincheck.core.extensions.llvm.jit import LlvmCode
 from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.mechanism import motions
 from kincheck.core.mechanism.motions import Ramp
-from kincheck.core.program.llvm import jit
-from kincheck.core.program.llvm.jit import LlvmCode
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
@@ -40,15 +40,15 @@ def made():
 
 
 def positions(model, *, often=False):
-    if often and model._code.interpreted:
-        model._code.count(10**9)
+    if often and model._bind.args[0].interpreted:
+        model._bind.args[0].count(10**9)
     path = motions.Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.0, 5))
     return sweep(model, path, 1e-12).points["tip"].position
 
 
 def test_code_in_use_survives_cleared_caches(cache_folder):
     model = made()
-    assert model._code.interpreted
+    assert model._bind.args[0].interpreted
     expected = positions(model)
     clear_caches()
     collect()

@@ -11,6 +11,9 @@ import pytest
 from kincheck.core import solve, solve_designs
 from kincheck.core.algebra import arc_tangent, root
 from kincheck.core.caches import clear_caches
+from kincheck.core.extensions.llvm import compiler
+from kincheck.core.extensions.llvm.executor import LlvmExecutor
+from kincheck.core.extensions.llvm.jit import LlvmCode
 from kincheck.core.kinematics import styles
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
@@ -30,11 +33,8 @@ from kincheck.core.program import (
     sin,
     where_larger,
 )
-from kincheck.core.program.llvm import compiler
-from kincheck.core.program.llvm.executor import LlvmExecutor
-from kincheck.core.program.llvm.jit import LlvmCode
 
-from ..support.mechanisms import chain, four_bar, mcpherson
+from ...support.mechanisms import chain, four_bar, mcpherson
 
 llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
@@ -152,7 +152,7 @@ def test_unreached_sample_message_in_both_executors():
 
 
 def test_numpy_executor_without_llvmlite(monkeypatch):
-    monkeypatch.setattr("kincheck.core.kinematics.compiled.compiled_model.available", lambda: False)
+    monkeypatch.setattr("kincheck.core.program.executor.compiler", lambda: None)
     mechanism = four_bar()
     model = compile_model(mechanism, Request((mechanism.drivers[0].name,), ()))
     assert isinstance(model.executor(3), NumpyExecutor)

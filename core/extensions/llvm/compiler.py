@@ -20,7 +20,7 @@ from platform import machine
 from struct import Struct, pack_into, unpack_from
 from typing import Any, NamedTuple
 
-from ..disk_cache import load_or_make
+from ...program.disk_cache import load_or_make
 
 TRAITS = b"vendor_id", b"cpu family", b"model", b"stepping", b"flags"
 """Fields of /proc/cpuinfo that LLVM depends on."""

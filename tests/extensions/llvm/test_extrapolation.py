@@ -20,7 +20,7 @@ from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import NODES, groups_behind, place_of
 
-from ..support.mechanisms import errors, mcpherson, slider_crank, slider_crank_motion
+from ...support.mechanisms import errors, mcpherson, slider_crank, slider_crank_motion
 
 STROKES = np.linspace(-0.08, 0.08, 33)
 
@@ -86,7 +86,7 @@ def crank_motion(angles, order=2, *, compiled=True):
 def eight_lanes(monkeypatch):
     monkeypatch.setattr("kincheck.core.kinematics.compiled.routes.LANES", 8)
     # whatever the processor's
-    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)
+    monkeypatch.setattr("kincheck.core.extensions.llvm.compiler.vector_width", lambda: 8)
 
 
 @pytest.mark.usefixtures("eight_lanes")
@@ -110,8 +110,8 @@ def test_extrapolation_by_several_vectors(lanes, order, interpreted, monkeypatch
     as many again.
     """
     pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
-    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: lanes)
-    monkeypatch.setattr("kincheck.core.program.llvm.jit.OFTEN", 10**9 if interpreted else 0)
+    monkeypatch.setattr("kincheck.core.extensions.llvm.compiler.vector_width", lambda: lanes)
+    monkeypatch.setattr("kincheck.core.extensions.llvm.jit.OFTEN", 10**9 if interpreted else 0)
     grid = np.concatenate(
         [
             np.linspace(-0.08, 0.0, 80),
@@ -179,7 +179,7 @@ def test_extrapolation_after_long_step(lanes, monkeypatch):
     eight.
     """
     pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
-    monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: lanes)
+    monkeypatch.setattr("kincheck.core.extensions.llvm.compiler.vector_width", lambda: lanes)
     angles = np.concatenate([0.002 * np.arange(21.0), 0.94 + 0.002 * np.arange(60.0)])
     iterations = crank_motion(angles)
     assert (iterations[21:25] > 1).any()

@@ -8,9 +8,7 @@ import ctypes
 import hashlib
 import math
 import sys
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
 from threading import Lock
@@ -19,10 +17,11 @@ from typing import Any
 import msgspec
 
 from ...caches import cache_last
-from .. import disk_cache, plan, straight_line, tape
-from ..plan import Plan
-from ..straight_line import Bytecode, bytecode, pack, unpack
+from ...program import disk_cache, plan, straight_line, tape
+from ...program.executor import at_once
+from ...program.plan import Plan
 from . import compiler
+from .bytecode import Bytecode, bytecode, pack, unpack
 from .loops import follow, parts, run, run_motions, settle
 from .plan import PlanInMemory, rows
 from .programs import declarations, function, interpret
@@ -103,24 +102,11 @@ sweep of 161 samples is 21 groups of eight, so `kincheck run` interprets six swe
 `AGAIN` holds for plans with tables in the cache: they come back often, so they are compiled in the
 first sweep.
 """
-_AT_ONCE = ContextVar("at once", default=False)
-
-
-@contextmanager
-def compiled_at_once() -> Generator[None]:
-    """Compile programs made in this block after their first run, to measure the warm cost."""
-    before = _AT_ONCE.set(True)
-    try:
-        yield
-    finally:
-        _AT_ONCE.reset(before)
 
 
 class LlvmCode:
     """A plan ready to run on this processor; its programs are interpreted first, and compiled if
     run often.
-
-    Raises ImportError if llvmlite is missing.
 
     Args:
         often: limit of interpretation, see `OFTEN`; infinite for programs that are never compiled.
@@ -152,7 +138,7 @@ class LlvmCode:
             self._interpret(tables)
         operations = sum(len(each.nodes) for each in plan.programs.values())
         if often == OFTEN:
-            often = 0 if _AT_ONCE.get() else AGAIN if again else OFTEN
+            often = 0 if at_once() else AGAIN if again else OFTEN
         self._left: float = often * max(OPERATIONS, operations) // OPERATIONS
 
     def call(self, loop: str, name: str) -> Callable[..., int]:

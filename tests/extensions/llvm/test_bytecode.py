@@ -8,15 +8,15 @@ from itertools import product
 import numpy as np
 import pytest
 from kincheck import cases
+from kincheck.core.extensions.llvm import compiler
+from kincheck.core.extensions.llvm.bytecode import bytecode, lower
+from kincheck.core.extensions.llvm.executor import LlvmExecutor
+from kincheck.core.extensions.llvm.jit import LlvmCode
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.program import Plan, Tape, absolute, before, program
-from kincheck.core.program.llvm import compiler
-from kincheck.core.program.llvm.executor import LlvmExecutor
-from kincheck.core.program.llvm.jit import LlvmCode
-from kincheck.core.program.straight_line import bytecode, lower
 
-from ..support.mechanisms import four_bar, mcpherson
+from ...support.mechanisms import four_bar, mcpherson
 from .test_llvm import OPERATIONS
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from kincheck.core import solve
 from kincheck.core.caches import clear_caches
+from kincheck.core.extensions.llvm import compiler, jit, machine_code
 from kincheck.core.harness.native_engine import NativeEngine
-from kincheck.core.program.llvm import compiler, jit, machine_code
+from kincheck.core.program.executor import compiled_at_once
 
-from ..support.mechanisms import mcpherson
+from ...support.mechanisms import mcpherson
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
@@ -74,7 +75,7 @@ def test_uncompilable_program_stays_interpreted(no_programs_kept, monkeypatch, c
 
     monkeypatch.setattr(jit, "load", fail)
     clear_caches()
-    with jit.compiled_at_once():
+    with compiled_at_once():
         for _ in range(3):
             np.testing.assert_array_equal(wheel(), expected)
     assert capfd.readouterr().err == "kincheck: note: a program stays interpreted: cannot select\n"

@@ -1,5 +1,5 @@
 """LLVM text over a vector of lanes, line by line: programs as functions, and the interpreter of
-their tables (see `straight_line`).
+their tables (see `bytecode`).
 
 The text calls LLVM instructions only: no library, no runtime. Sine and cosine are reduced and
 summed in place. The W lanes of a vector are contiguous, slot by slot: a program touches one stretch
@@ -20,8 +20,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from heapq import heappop, heappush
 
-from ..straight_line import ARITY, FUSED, KINDS, Program, lower, unroll
-from ..tape import LEAVES, Node, operands, place_of
+from ...program.straight_line import Program
+from ...program.tape import LEAVES, Node, operands, place_of
+from .bytecode import ARITY, FUSED, KINDS, lower, unroll
 
 # The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after
 # reduction.

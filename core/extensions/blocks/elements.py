@@ -8,18 +8,21 @@ are constants of its program; others are read from slots of their own.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Scalar
-from ...program import Program, Tape, Traced, program
-from ...program.straight_line import Bytecode, bytecode, repeated
-from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import (
+from ...kinematics.compiled.compiled_model import is_builtin
+from ...kinematics.compiled.dense_equations import GEOMETRY, System
+from ...kinematics.compiled.request import RATE, Layout
+from ...kinematics.formulation.cartesian import COLUMNS, Cartesian
+from ...kinematics.formulation.constraints import (
     Constraint,
     Relation,
     coordinates_of,
@@ -27,14 +30,39 @@ from ..formulation.constraints import (
     structure,
     with_numbers,
 )
-from .request import RATE, Layout
+from ...kinematics.formulation.styles import NATIVE
+from ...program import Plan, Program, Tape, Traced, program
+from ...program.executor import Bind
+from ..llvm.bytecode import Bytecode, bytecode, repeated
+from ..llvm.compiler import vector_width
+from ..llvm.executor import LlvmExecutor
+from ..llvm.jit import LlvmCode
 
 Indices = NDArray[np.intp]
 ROWS, GAMMA, RETRACT = "rows", "gamma", "retract"
-GEOMETRY = "geometry"
-"""The vector of the numbers that differ within a kind."""
 AFTER = "after "
 """Before the names of the vectors of a state: after the step."""
+
+
+class LargeSystem(System):
+    """A system in machine code: interpreted, because it takes longer to compile so many operations
+    than they ever run. Joints of the library in the native style are elements.
+    """
+
+    def ready(self, outputs: Program) -> tuple[Plan, Bind]:
+        """See `System`."""
+        tracer, tables = self.tracer, None
+        if tracer.request.style == NATIVE and is_builtin(tracer.mechanism):
+            found, self.after = Elements(tracer.formulation, tracer.layout, vector_width()), AFTER
+            self.rows, self.columns, self.sizes = found.rows, found.columns, {**found.sizes}
+            self.geometry = found.geometry[:, None]
+            last = bytecode(outputs, len(tracer.layout.slots), vector_width())
+            tables = {**found.tables, outputs.name: last}
+            programs = {name: Program(name, (), {}) for name in found.tables}
+            plan = Plan({**programs, outputs.name: outputs}, tracer.layout.slots)
+        else:
+            plan, _ = super().ready(outputs)
+        return plan, partial(LlvmExecutor, LlvmCode(plan, often=math.inf, tables=tables))
 
 
 class _Member(NamedTuple):

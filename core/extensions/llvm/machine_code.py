@@ -1,19 +1,44 @@
-"""Whether machine code runs here: llvmlite is installed, loads, and compiles the loops. Where it
-does not, numpy runs the same programs.
-"""
+"""Machine code of plans, by llvmlite: whether it runs here, and the programs of a plan."""
 
 from __future__ import annotations
 
 import importlib.util
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 
 from ...extras import how_to_install, installed_version
-from . import jit
+from ...program.executor import Bind
+from ...program.plan import Plan
+from . import compiler, jit
+from .executor import LlvmExecutor
 
 
-def available(load: Callable[[], object] = jit.load_loops) -> bool:
+class Llvm:
+    """The compiler of plans that llvmlite gives; see `program.executor.Compiler`."""
+
+    @property
+    def width(self) -> int:
+        """The doubles in a vector register of this processor."""
+        return compiler.vector_width()
+
+    def works(self) -> bool:
+        """Return whether machine code runs here."""
+        return works()
+
+    def problem(self) -> str:
+        """Return why llvmlite, which is installed, makes no machine code here."""
+        return problem()
+
+    def compile(self, plan: Plan) -> Bind:
+        """Make a plan ready: interpreted at first, and compiled if it runs often."""
+        return partial(LlvmExecutor, jit.LlvmCode(plan))
+
+
+LLVM = Llvm()
+
+
+def works(load: Callable[[], object] = jit.load_loops) -> bool:
     """Return whether machine code runs here; print a note, once, if llvmlite is installed and
     fails.
 

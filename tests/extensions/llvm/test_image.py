@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from kincheck.core import solve
 from kincheck.core.caches import clear_caches
-from kincheck.core.program.llvm import compiler, jit
+from kincheck.core.extensions.llvm import compiler, jit
+from kincheck.core.program.executor import compiled_at_once
 
-from ..support.mechanisms import mcpherson
+from ...support.mechanisms import mcpherson
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 images = pytest.mark.skipif(not compiler.possible(), reason="images run on x86-64 under Linux")
@@ -78,7 +79,7 @@ def positions() -> np.ndarray:
 def test_object_files_where_images_cannot_run(cache_folder):
     expected = positions()
     loaded, load = list[str](), compiler.load_object
-    with pytest.MonkeyPatch.context() as patch, jit.compiled_at_once():
+    with pytest.MonkeyPatch.context() as patch, compiled_at_once():
         patch.setattr(compiler, "possible", lambda: False)
         patch.setattr(compiler, "load_object", lambda file: loaded.append("once") or load(file))
         for _ in range(2):  # compiled, then kept

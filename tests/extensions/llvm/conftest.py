@@ -4,7 +4,7 @@ from shutil import copytree
 
 import pytest
 from kincheck.core.caches import clear_caches
-from kincheck.core.program.llvm import compiler, jit, machine_code
+from kincheck.core.extensions.llvm import compiler, jit, machine_code
 
 
 @pytest.fixture(scope="session")
@@ -30,6 +30,6 @@ def no_programs_kept(tmp_path, monkeypatch, loops):
 @pytest.fixture
 def cache_folder(monkeypatch, tmp_path):
     """The folder of a cache of the test's own, which is not there yet."""
-    machine_code.available()  # its loops are kept where others are
+    machine_code.works()  # its loops are kept where others are
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     return tmp_path / "kincheck"

@@ -1,1 +1,0 @@
-"""Programs and their loops as machine code: LLVM text, compilation, cache and calls."""
