@@ -37,13 +37,9 @@ if TYPE_CHECKING:
         Universal,
     )
     from .kinematics import (
-        Assembled,
         Curve,
         Designs,
         Event,
-        Residuals,
-        assemble,
-        residuals,
         solve,
         solve_designs,
         trace,
@@ -57,7 +53,6 @@ __version__ = VERSION
 
 __all__ = [
     "GROUND",
-    "Assembled",
     "Body",
     "BodyMotion",
     "Case",
@@ -92,7 +87,6 @@ __all__ = [
     "RackPinion",
     "Ramp",
     "Record",
-    "Residuals",
     "Results",
     "Revolute",
     "RevoluteSpherical",
@@ -108,10 +102,8 @@ __all__ = [
     "Universal",
     "UnknownNameError",
     "__version__",
-    "assemble",
     "check_joint",
     "clear_caches",
-    "residuals",
     "solve",
     "solve_designs",
     "trace",
@@ -130,9 +122,7 @@ _NAMES = {
     ),
     "case.case": "Case",
     "case.io.reader_options": "Supplied",
-    "kinematics": (
-        "Assembled Curve Designs Event Residuals assemble residuals solve solve_designs trace"
-    ),
+    "kinematics": ("Curve Designs Event solve solve_designs trace"),
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",
     "studies.checks.check_joint": "check_joint",

@@ -15,7 +15,7 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.extensions.adams.dataset import read_dataset
 from kincheck.core.extensions.adams.model import read_markers, read_places, read_units
-from kincheck.core.kinematics import needed_forces
+from kincheck.core.extensions.residuals.replay import needed_forces
 from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation
 

@@ -50,11 +50,10 @@ IMPORTS = {
     "joints": ". primitives",
     "kincheck": ". __init__ case case/io cli harness primitives report",
     "kinematics": (
-        ". kinematics/assembly kinematics/compiled kinematics/continuation "
+        ". kinematics/compiled kinematics/continuation "
         "kinematics/forces kinematics/formulation kinematics/structure "
         "mechanism primitives program"
     ),
-    "kinematics/assembly": ". kinematics/compiled kinematics/formulation mechanism primitives",
     "kinematics/compiled": (
         ". joints kinematics/forces kinematics/formulation kinematics/structure mechanism "
         "primitives program"

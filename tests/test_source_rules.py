@@ -13,7 +13,10 @@ from .support.sources import DOOR, SOURCES, TESTS, imported, module_of, tree
 SIMULATORS = {"mujoco", "pinocchio", "exudyn", "opensim", "pydrake", "dartpy"}
 
 
-NUMERICS = {"assemblies", "blocks", "code", "explain", "free", "laboratory", "proofs", "statics"}
+NUMERICS = {
+    *("assemblies", "blocks", "code", "explain", "free", "laboratory", "llvm", "proofs"),
+    *("residuals", "statics"),
+}
 """Extensions that walk or prove the equations in another way, and see the inside of kinematics."""
 
 
@@ -92,7 +95,7 @@ def test_sources_follow_rules(rule):
     assert found == {}
 
 
-INSIDE = {"kinematics", "program", "test_joint_probe.py"}
+INSIDE = {"kinematics", "llvm", "program", "test_joint_probe.py"}
 """Below tests: those of the inside of kinematics, and of its programs."""
 
 
@@ -109,7 +112,7 @@ OFFENDERS = """
 past_the_door | core/case/new.py | from ..kinematics.one_design import prepare
 past_the_door | core/case/io/new.py | from ...kinematics import compiled
 past_the_door | core/cli/new.py | def f():\\n    from ..kinematics.one_design import solve
-past_the_door | core/kincheck/new.py | import kincheck.core.kinematics.replay
+past_the_door | core/kincheck/new.py | import kincheck.core.kinematics.followed
 past_the_door | adapters/new.py | from ..core.kinematics.compiled.request import Request
 simulators_at_import | adapters/new.py | import mujoco
 simulators_at_import | adapters/new.py | class A:\\n    from mujoco.viewer import launch

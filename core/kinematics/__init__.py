@@ -8,14 +8,9 @@ Solve:
     solve_designs      many designs over a sweep, each with its own geometry
     forces_of          reactions of joints and efforts of drivers of a solved motion
     trace              a motion by its arc length, beyond lock-ups of a driver
-    assemble           a closed pose from an estimate
     angle_with_turns   the angle of a joint, followed from the design
     attitude_with_turns
                        the attitude of a body, followed from the design
-    count_turns        an angle known up to whole turns, from sample to sample
-    begun_turns        the whole turns at which coupled joints of a recording begin
-    residuals          what poses from elsewhere leave of the rows, and what their digits allow
-    needed_forces      the forces that a motion from elsewhere needs, and what nothing holds
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
                        many designs (`prepare_designs`), and tells the size of its programs
 
@@ -38,7 +33,6 @@ The folders:
     compiled         one mechanism as compiled programs: request, programs, model, routes
     continuation     the walk along a path, singular poses, curves by arc length
     forces           the equations of forces, and the forces of a solved motion
-    assembly         closed poses from estimates and random starts
 """
 
 # pyright: reportUnusedImport=false
@@ -47,7 +41,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .assembly.assemble import Assembled, assemble
     from .compiled.request import LAST_ITERATION, WantedOutput
     from .compiled.routes import Start, notes_on_start, solve_from_start, start_of
     from .continuation.trace import Curve, Event, trace
@@ -77,23 +70,10 @@ if TYPE_CHECKING:
     from .motion_solver import Method, Solver
     from .native_solver import NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import solve
-    from .replay import (
-        TURN,
-        Needed,
-        Residuals,
-        Worst,
-        begun_turns,
-        count_turns,
-        judged_part,
-        needed_forces,
-        replay_motions,
-        residuals,
-    )
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
 
 _NAMES = {
-    "assembly.assemble": "Assembled assemble",
     "compiled.request": "LAST_ITERATION WantedOutput",
     "compiled.routes": "Start notes_on_start solve_from_start start_of",
     "continuation.trace": "Curve Event trace",
@@ -113,10 +93,6 @@ _NAMES = {
     "native_solver": "NativeSolver PreparedDesigns ProgramSize",
     "motion_solver": "Method Solver",
     "one_design": "solve",
-    "replay": (
-        "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces"
-        " replay_motions residuals"
-    ),
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",
 }

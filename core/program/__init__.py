@@ -12,10 +12,10 @@
 Executors:
 
 - `numpy_executor`: one ufunc call per operation over all lanes. No start-up cost; the oracle of the
-  tests. `NumpyExecutor` and `NumpyTrack` describe what every executor does.
-- `executor`: what each executor does; machine code by the compiler of an extension, or numpy.
+  tests. `NumpyExecutor` and `NumpyTrack` describe every executor.
+- `executor`: the methods of every executor; machine code by an extension's compiler, or numpy.
 
-`disk_cache` keeps traced programs on disk, and what an extension makes of them.
+`disk_cache` keeps traced programs on disk, with their tables and machine code.
 
 A mechanism's program is described once, in `core.kinematics.compiled`: `Tracing` names the slots of
 its lanes and holds its `Plan`, `Model` makes the plan ready, and binds it to lanes.

@@ -2,7 +2,7 @@
 content.
 
 Entries become running code, so only this user may have written them. A folder that others can
-write, or could replace, is not used; an entry of another user, or one that cannot be read, is made
+write, or could replace, is not used; an entry of another user, or an unreadable one, is made
 again.
 """
 
@@ -76,7 +76,7 @@ def doubt(here: Path) -> str:
 
 
 def _way(path: Path) -> Iterator[Path]:
-    """Yield the folders and links that lead to a path, and the path."""
+    """Yield the folders and links on the way to a path, and the path."""
     here, waiting = Path(path.anchor), [*reversed(path.parts[1:])]
     yield here
     while waiting:

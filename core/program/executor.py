@@ -92,7 +92,7 @@ class Compiler(Protocol):
 
 
 def compiler() -> Compiler | None:
-    """Return the compiler that works here; None if numpy has to run the programs."""
+    """Return a compiler in working order; None if numpy has to run the programs."""
     offered: list[Compiler] = [offer.load() for offer in offers("compilers").values()]
     return next((each for each in offered if each.works()), None)
 

@@ -7,7 +7,6 @@ from collections import Counter
 import pytest
 from kincheck.core.algebra import Vec3
 from kincheck.core.case.io import table
-from kincheck.core.case.io.element import DEEPEST, MOST_ELEMENTS, parse_xml
 from kincheck.core.case.io.foreign import MOST_MEMBERS
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_samples import read_table, samples_of
@@ -15,6 +14,7 @@ from kincheck.core.case.models.files import load
 from kincheck.core.extensions.hardpoints.rows import MOST_LINES
 from kincheck.core.extensions.trees.reader import read_tree
 from kincheck.core.extensions.trees.tree import MOST_TIES
+from kincheck.core.extensions.xml.element import DEEPEST, MOST_ELEMENTS, parse_xml
 
 from ..support.case_texts import complains, refused, write
 from ..support.model_files import driven

@@ -7,8 +7,10 @@ EXTENSION = Extension(
     needs=["exports"],
     commands={"assemblies": "command:ListAssemblies"},
     public={
+        "Assembled": "assemble:Assembled",
         "Assemblies": "assembly_modes:Assemblies",
         "Assembly": "assembly_modes:Assembly",
+        "assemble": "assemble:assemble",
         "find_assemblies": "assembly_modes:find_assemblies",
     },
 )

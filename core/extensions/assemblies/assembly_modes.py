@@ -25,7 +25,6 @@ from ...errors import number_of
 from ...input_checks import require_positive
 from ...joints import Joint
 from ...joints.base import unit
-from ...kinematics.assembly.assemble import Closing, require_named, require_shapes
 from ...kinematics.formulation.cartesian import Cartesian
 from ...kinematics.formulation.constraints import Frames
 from ...kinematics.formulation.state_vectors import displaced, jacobian, state_of
@@ -35,6 +34,7 @@ from ...mechanism.tree import spanning_tree
 from ...primitives.base import GROUND_POSE, Pose
 from ...tabular import Tabular
 from ...trajectory import Array
+from .assemble import Closing, require_named, require_shapes
 
 # A normalised triple product below this at design (half a degree) has no sign that rounding of a
 # table would not change.

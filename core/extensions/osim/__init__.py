@@ -2,4 +2,4 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, needs=("trees",), readers={"osim": "reader:OSIM"})
+EXTENSION = Extension(__name__, needs=["trees", "xml"], readers={"osim": "reader:OSIM"})

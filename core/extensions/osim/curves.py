@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 from numpy.polynomial import Polynomial
 
-from ...case.io.element import Element, words
 from ...joints import PiecewisePolynomial, Spline
 from ..trees.tree import (
     require_spline,
 )
+from ..xml.element import Element, words
 
 FUNCTIONS = (
     *words("Constant LinearFunction PolynomialFunction MultiplierFunction"),

@@ -21,7 +21,6 @@ from numpy.polynomial import Polynomial
 
 from ...algebra import IDENTITY, Quat, Vec3, X, Y, Z
 from ...case.io.document import fault, read_text, shown
-from ...case.io.element import LEFT, TAKEN, ZEROS, Apart, Element, Names, parse_xml, words
 from ...case.io.readers import LARGEST_FILE
 from ...errors import KincheckError
 from ...extras import library
@@ -42,6 +41,7 @@ from ..trees.tree import (
     Strut,
     Tree,
 )
+from ..xml.element import LEFT, TAKEN, ZEROS, Apart, Element, Names, parse_xml, words
 from .curves import ZERO, curve_of, function, is_own, polynomial
 
 VERSION_4 = 40_000

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from ..trees.reader import TreeReader
 
 if TYPE_CHECKING:
-    from ...case.io.element import Element
     from ..trees.tree import Tree
+    from ..xml.element import Element
 
 
 @dataclass(frozen=True)

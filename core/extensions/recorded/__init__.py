@@ -3,5 +3,7 @@
 from ...doors import Extension
 
 EXTENSION = Extension(
-    __name__, sources={"recordings": "source:Recordings", "program": "source:Program"}
+    __name__,
+    needs=["residuals", "xml"],
+    sources={"recordings": "source:Recordings", "program": "source:Program"},
 )

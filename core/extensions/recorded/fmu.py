@@ -22,7 +22,6 @@ import numpy as np
 
 from ...case.case import TIME, Case
 from ...case.io.document import fault, read_bytes
-from ...case.io.element import Element, parse_xml
 from ...case.io.foreign import too_large
 from ...case.io.reference_samples import RATES
 from ...errors import MOST_NAMED, CaseError, KincheckError, brief, shortened
@@ -30,6 +29,7 @@ from ...extras import how_to_install, installed_version
 from ...harness.trajectory_check import Reported
 from ...trajectory import Array
 from ...unit_text import value_text
+from ..xml.element import Element, parse_xml
 from .engine import RecordedEngine
 from .meaning import MAP, Meaning, Reader, Use, inputs_of, unit_of
 from .readers import Column, Head, Recording

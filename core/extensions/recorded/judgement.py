@@ -16,10 +16,10 @@ from ...case.case import Case, size
 from ...case.units import LENGTHS
 from ...errors import shortened
 from ...harness.trajectory_check import CONSTRAINED
-from ...kinematics import Needed, Residuals, Worst, needed_forces, replay_motions
 from ...mechanism.mechanism import Mechanism
 from ...trajectory import PER_TIME, QUANTITIES, Array, BodyMotion
 from ...unit_text import value_text
+from ..residuals.replay import Needed, Residuals, Worst, needed_forces, replay_motions
 from .meaning import REACTIONS, Accuracy, Meaning, all_readings, si_values
 from .samples import Samples, driven_angles, samples_of
 

@@ -20,11 +20,11 @@ import numpy as np
 
 from ...case.curves import Printed
 from ...case.io.document import decimal, fault, read_bytes, read_text, shown
-from ...case.io.element import Element, parse_xml
 from ...case.io.reference_samples import RATES, layout_of, read_table, samples_of
 from ...case.io.table import Table, unit_of_head
 from ...errors import MOST_NAMED, CaseError, brief, remedy, shortened
 from ...trajectory import Array
+from ..xml.element import Element, parse_xml
 from .records import JSON, table_of_json
 
 

@@ -20,13 +20,13 @@ from ...case.measures import coordinate_of
 from ...case.quantity import point_jets, still_jets, with_markers
 from ...errors import MOST_NAMED, number_of, shortened
 from ...jet import Jet
-from ...kinematics import count_turns
 from ...mechanism.body import Body
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...primitives.base import Pose as Placed
 from ...primitives.base import Twist
 from ...trajectory import Array, BodyMotion, PointMotion
+from ..residuals.replay import count_turns
 from .meaning import EVENT, MAP, Meaning, Pose, si_values, unit_of
 from .readers import Column, Recording
 

@@ -18,9 +18,9 @@ from ...case.curves import match_rows
 from ...case.io.document import fault, shown
 from ...case.io.reference_samples import RATES
 from ...case.io.schema import MOST_SAMPLES
-from ...kinematics import TURN, begun_turns
 from ...mechanism.motions import Absolute, JointDriver, Motion, Table
 from ...trajectory import Array
+from ..residuals.replay import TURN, begun_turns
 from .meaning import MAP
 from .samples import Samples, driver_motion
 

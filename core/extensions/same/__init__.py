@@ -2,4 +2,6 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, needs=["free", "trees"], commands={"same": "command:Same"})
+EXTENSION = Extension(
+    __name__, needs=["free", "residuals", "trees", "xml"], commands={"same": "command:Same"}
+)

@@ -9,11 +9,11 @@ from typing import TypeAlias
 import numpy as np
 
 from ...joints.base import Joint, unit
-from ...kinematics import Residuals, residuals
 from ...mechanism.body import Body
 from ...mechanism.mechanism import GROUND
 from ...trajectory import Array
 from ..free.free_poses import FreePoses, Poses
+from ..residuals.replay import Residuals, residuals
 from .links import Match
 from .undriven import Coordinate, Undriven
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...case.case import Case
-from ...case.io.element import Element, printed_digits
 from ...case.models.files import load
 from ...joints import Revolute, Translational
 from ...kinematics import reduce_rows
@@ -19,6 +18,7 @@ from ..trees.gluing import glue
 from ..trees.laws import Laws, laws_of, tendons_of
 from ..trees.reader import is_model, read_tree, root_of
 from ..trees.tree import NO_LIMIT, Limit, Strut
+from ..xml.element import Element, printed_digits
 
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
 _PARTS = 12

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import shortened
-from ...kinematics import Residuals
 from ...trajectory import Array
 from ..free.free_poses import FreePoses, Poses, Walked
+from ..residuals.replay import Residuals
 from .links import Match, match_links
 from .lost import lost_items
 from .motion import Placement, left_in, measurable, placement, tied_links, values

@@ -9,5 +9,7 @@ any order, which is hung up as a tree. `case.case_of` makes the case of a tree. 
 from ...doors import Extension
 
 EXTENSION = Extension(
-    __name__, readers={"mjcf": "reader:MJCF", "urdf": "reader:URDF", "sdf": "reader:SDF"}
+    __name__,
+    needs=["xml"],
+    readers={"mjcf": "reader:MJCF", "urdf": "reader:URDF", "sdf": "reader:SDF"},
 )

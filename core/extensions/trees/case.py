@@ -16,7 +16,6 @@ from ...algebra import X, Y, vec
 from ...case.case import Case, Sweep, Truth
 from ...case.closing import within_digits
 from ...case.io.document import SMALLEST, explained, usable
-from ...case.io.element import Names
 from ...case.io.outputs import with_all_motions
 from ...case.io.readers import LEFT_OUT
 from ...errors import WARNING, CaseError, MechanismError, shortened
@@ -37,6 +36,7 @@ from ...mechanism.body import Body, Inertia, checked_inertia
 from ...mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism, Point
 from ...mechanism.motions import Absolute, Driver, JointAngle, JointDisplacement, Motion, Table
+from ..xml.element import Names
 from .assembly import Assembled, assemble
 from .driving import (
     KEYFRAME,

@@ -15,11 +15,11 @@ import numpy as np
 
 from ...algebra import quat, vec
 from ...case.io.document import decimal, interval, measure, shown, unknown_name, usable
-from ...case.io.element import Element
 from ...case.io.schema import MOST_SAMPLES
 from ...case.units import ANGLES, LENGTHS
 from ...errors import MOST_NAMED, CaseError, remedy, shortened, with_article
 from ...trajectory import Array
+from ..xml.element import Element
 from .assembly import AT_REST, Assembled, Pose, Start, Value
 from .options import ModelOptions
 from .place import Place, unit_quaternion

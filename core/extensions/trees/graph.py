@@ -20,9 +20,9 @@ from typing import TypeAlias
 
 from ...algebra import IDENTITY, ZERO, Quat, Vec3, X
 from ...case.io.document import SMALLEST
-from ...case.io.element import Element, significant_digits
 from ...errors import WARNING
 from ...mechanism.mechanism import GROUND
+from ..xml.element import Element, significant_digits
 from .place import ORIGIN, Place, turn_about, unit_quaternion
 from .tree import COPY, NO_LIMIT, WORLD, Closure, Coupling, Kind, Limit, Mass, Move, Strut, Tree
 

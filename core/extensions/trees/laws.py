@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TypeAlias
 
-from ...case.io.element import Element
+from ..xml.element import Element
 from .tree import Move, Tree
 
 Laws: TypeAlias = Mapping[str, float]

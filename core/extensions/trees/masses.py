@@ -15,9 +15,9 @@ import numpy as np
 
 from ...algebra import ZERO, X, Y, Z, quat, vec
 from ...case.io.document import usable
-from ...case.io.element import ZEROS, Element
 from ...errors import CaseError
 from ...trajectory import Array
+from ..xml.element import ZEROS, Element
 from .mjcf_language import Classes, Compiler
 from .place import Place, turn_to, unit_quaternion
 from .tree import Mass, sum_of_masses

@@ -12,9 +12,9 @@ from typing import TypeAlias, cast
 
 from ...algebra import X, quat, vec
 from ...case.io.document import shown
-from ...case.io.element import ZEROS, Element, significant_digits, words
 from ...errors import MOST_NAMED, WARNING, CaseError, remedy, shortened
 from ...mechanism.mechanism import GROUND, Vector
+from ..xml.element import ZEROS, Element, significant_digits, words
 from .graph import CLOSING
 from .masses import STAND_INS, mass_of
 from .mjcf_language import (

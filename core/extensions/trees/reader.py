@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection
 
     from ...case.case import Case
-    from ...case.io.element import Element
+    from ..xml.element import Element
     from .tree import Tree
 
 
@@ -36,7 +36,7 @@ class TreeReader(Reader):
             CaseError: it is not well-formed.
             KincheckError: a library is missing.
         """
-        from ...case.io.element import parse_xml
+        from ..xml.element import parse_xml
 
         return parse_xml(file, text_of(file))
 

@@ -19,8 +19,8 @@ from typing import TypeAlias
 
 from ...algebra import Vec3, X, cross
 from ...case.io.document import decimal, shown, usable
-from ...case.io.element import Element, Names, words
 from ...errors import CaseError
+from ..xml.element import Element, Names, words
 from .graph import Freedom, Graph, Joint, global_frames
 from .place import Place, coordinates, turn_of_axes
 from .tree import BushingLaw, Coupling, Kind, Spring, Strut

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from ...algebra import Vec3, X, Y, Z
 from ...case.io.document import read_text, shown
-from ...case.io.element import EXTENDED, TAKEN, ZEROS, Apart, Element, file_near, parse_xml, words
 from ...case.io.readers import LARGEST_FILE
 from ...errors import CaseError
+from ..xml.element import EXTENDED, TAKEN, ZEROS, Apart, Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
 from .masses import mass_in
 from .place import ORIGIN, Place

@@ -8,8 +8,8 @@ from functools import cached_property
 
 from ...algebra import quat, vec
 from ...case.io.document import shown
-from ...case.io.element import DEEPEST, Element
 from ...errors import remedy
+from ..xml.element import DEEPEST, Element
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .tree import WORLD
 

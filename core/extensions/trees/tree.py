@@ -19,12 +19,12 @@ import numpy as np
 
 from ...algebra import ZERO, Vec3, X, Y, Z
 from ...case.io.document import LARGEST, decimal, fault, shown
-from ...case.io.element import Account, Apart, Element, Names, settle
 from ...errors import CaseError, MechanismError
 from ...joints import PiecewisePolynomial, Spline
 from ...mechanism.loads import Law
 from ...mechanism.mechanism import GROUND, Vector
 from ...trajectory import Array
+from ..xml.element import Account, Apart, Element, Names, settle
 from .place import ORIGIN, Place
 
 WORLD = "world"

@@ -16,9 +16,9 @@ from dataclasses import replace
 
 from ...algebra import Quat, Vec3, X, Y, Z, vec
 from ...case.io.document import shown
-from ...case.io.element import ZEROS, Apart, Element, words
 from ...errors import CaseError
 from ...joints.base import triad
+from ..xml.element import ZEROS, Apart, Element, words
 from .graph import Freedom, Graph, Joint
 from .loop_files import read_loop_files
 from .masses import mass_in

@@ -2,4 +2,4 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, needs=("trees",), readers={"usd": "reader:STAGE"})
+EXTENSION = Extension(__name__, needs=["trees", "xml"], readers={"usd": "reader:STAGE"})

@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import cast
 
 from ...algebra import X, Y, Z
-from ...case.io.element import Element
 from ..trees.graph import FramedFreedom
 from ..trees.tree import (
     Kind,
 )
+from ..xml.element import Element
 
 AXES = {"X": X, "Y": Y, "Z": Z}
 TYPES: Mapping[str, Kind | None] = {

@@ -16,7 +16,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from ...algebra import cross, quat, vec
-from ...case.io.element import LEFT, ZEROS, Apart, Element, words
 from ...errors import remedy, shortened, similar
 from ...mechanism.mechanism import Vector
 from ..trees.graph import FramedFreedom, FramedJoint, Graph, global_frames, join
@@ -34,6 +33,7 @@ from ..trees.tree import (
     Tree,
     limit_of,
 )
+from ..xml.element import LEFT, ZEROS, Apart, Element, words
 from .freedoms import AXES, GENERIC, TYPES, bounds_of, equality, freedoms_of, short_names
 from .usd_stage import UNITS
 

@@ -16,9 +16,9 @@ from typing import Any, cast
 import numpy as np
 
 from ...case.io.document import fault, require_file, shown
-from ...case.io.element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
 from ...errors import CaseError, remedy, shortened, similar
 from ...extras import library
+from ..xml.element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
 
 FLATTEN = "write all into one file: usdcat --flatten FILE -o flat.usda"
 UNITS = ("metersPerUnit", "kilogramsPerUnit", "upAxis")

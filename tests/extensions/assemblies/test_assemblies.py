@@ -109,7 +109,7 @@ def test_assembly_rejects_violated_redundant_rows(monkeypatch):
     mechanism = replace(four_bar(), joints=tilted)
     start = perturbed(mechanism, 0.1, 0.0, np.random.default_rng(1), 4)
     assert assemble(mechanism, start, {"turn": 1.0}).converged.all()
-    monkeypatch.setattr("kincheck.core.kinematics.assembly.assemble.CONSISTENT", 1e-12)
+    monkeypatch.setattr("kincheck.core.extensions.assemblies.assemble.CONSISTENT", 1e-12)
     found = assemble(mechanism, start, {"turn": 1.0})
     assert found.spurious.all()
     assert not found.converged.any()

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.core.case.io.element import parse_xml
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.measures import DriverEffort
 from kincheck.core.case.models.files import load
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.extensions.trees.mjcf_language import require_known_attributes
+from kincheck.core.extensions.xml.element import parse_xml
 from kincheck.core.harness.compare import output_series
 
 from ...support.case_texts import complains, refused, write

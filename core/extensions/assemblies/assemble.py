@@ -24,15 +24,15 @@ from numpy.typing import NDArray
 from ...dataset import AXIS, PARAMETER, Dataset, Variable
 from ...errors import SolveError, number_of
 from ...input_checks import real, require_kind, require_known, require_positive
+from ...kinematics.compiled.dense_equations import System
+from ...kinematics.compiled.programs import Tracer
+from ...kinematics.compiled.request import CONSISTENT, Request
+from ...kinematics.formulation.state_vectors import displaced, standing_drives, state_of
+from ...kinematics.formulation.styles import MIXED, require_style
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Pose
 from ...tabular import Tabular
 from ...trajectory import Array, BodyMotion
-from ..compiled.dense_equations import System
-from ..compiled.programs import Tracer
-from ..compiled.request import CONSISTENT, Request
-from ..formulation.state_vectors import displaced, standing_drives, state_of
-from ..formulation.styles import MIXED, require_style
 
 MAX_ITERATIONS = 100
 # mu over |phi|^2: 0.01 to 1 serve alike on the strut; less lets singular Jacobians throw bodies

@@ -26,9 +26,9 @@ from kincheck import (
     solve,
 )
 
-from ..oracles import naive
-from ..support.adams_single_joints import CASES, NAMES, axes, right
-from ..support.mechanisms import four_bar
+from ...oracles import naive
+from ...support.adams_single_joints import CASES, NAMES, axes, right
+from ...support.mechanisms import four_bar
 
 # The data have six significant digits, trailing zeros left out.
 DIGITS = 6

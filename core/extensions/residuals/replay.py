@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SolveError, UnknownNameError
-from ..forces import Forces
-from ..mechanism.mechanism import GROUND, Mechanism
-from ..mechanism.motions import Path
-from ..trajectory import QUANTITIES, Array, BodyMotion, Trajectory
-from .forces.reactions import TURN, ForceRows, forces_of, with_rates
-from .formulation.cartesian import Cartesian
-from .formulation.constraints import Constraint, frames
-from .formulation.formulation import Relation
+from ...errors import SolveError, UnknownNameError
+from ...forces import Forces
+from ...kinematics.forces.reactions import TURN, ForceRows, forces_of, with_rates
+from ...kinematics.formulation.cartesian import Cartesian
+from ...kinematics.formulation.constraints import Constraint, frames
+from ...kinematics.formulation.formulation import Relation
+from ...mechanism.mechanism import GROUND, Mechanism
+from ...mechanism.motions import Path
+from ...trajectory import QUANTITIES, Array, BodyMotion, Trajectory
 
 WIDTHS = {"poses": 7, "velocities": 6, "accelerations": 6}
 """Numbers of a body, by argument of `residuals`."""
