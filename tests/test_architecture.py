@@ -70,8 +70,7 @@ IMPORTS = {
     "report": ". case case/io harness history joints mechanism",
     "studies": ". case case/io harness mechanism",
     "studies/checks": (
-        ". case case/io harness harness/workers joints kinematics mechanism primitives "
-        "program report"
+        ". case case/io harness joints kinematics mechanism primitives program report"
     ),
 }
 """Folder of the kernel in core: the folders it imports besides itself, whenever the import runs."""

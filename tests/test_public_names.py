@@ -40,7 +40,7 @@ def test_import_loads_names_only():
     assert found == ["", "kincheck kincheck.core kincheck.core.version", "True False"]
 
 
-BY_NAME = ("check_engine", "load", "primitives", "report", "run")
+BY_NAME = ("load", "primitives", "report", "run")
 VARY = """schema = "kincheck-vary/1"
 mode = "monte_carlo"
 units = { length = "mm", angle = "deg" }

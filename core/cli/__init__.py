@@ -14,7 +14,6 @@ COMMANDS = {
     "list": "lists:List",
     "import": "importing:Import",
     "check-joint": "checks:CheckJoint",
-    "check-engine": "checks:CheckEngine",
     "history": "history:ListRuns",
     "report": "history:ReportChanges",
     "schema": "lists:PrintSchema",

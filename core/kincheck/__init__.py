@@ -20,17 +20,17 @@ from kincheck import core
 
 if TYPE_CHECKING:
     from kincheck import primitives
-    from kincheck.by_name import check_engine, load, report, run
+    from kincheck.by_name import load, report, run
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
 
-    __all__ = ["check_engine", "load", "primitives", "report", "run"]
+    __all__ = ["load", "primitives", "report", "run"]
     __all__ += core.__all__
 
     # what extensions offer has no type here: the kernel names none of them
     def __getattr__(name: str) -> Any: ...
 
 
-_OWN = ("check_engine", "load", "primitives", "report", "run")
+_OWN = ("load", "primitives", "report", "run")
 
 
 if not TYPE_CHECKING:

@@ -6,7 +6,6 @@ from typing import Any
 from kincheck.core import KincheckError
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
-from kincheck.core.cli.checks import CheckEngine
 from kincheck.core.cli.main import function, registry
 from kincheck.core.cli.parser import Command
 from kincheck.core.cli.run import Run
@@ -15,7 +14,6 @@ from kincheck.core.harness.record import Results
 from kincheck.core.report.report import write_report
 
 run = function("run", Run)
-check_engine = function("check_engine", CheckEngine)
 
 
 def offered(name: str) -> Any:

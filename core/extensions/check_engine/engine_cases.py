@@ -17,7 +17,7 @@ from ...case.quantity import with_markers
 from ...joints import Attachment, Joint, Revolute
 from ...joints.base import directions, position, require_perpendicular, unit
 from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
-from .joint_loops import with_loads
+from ...studies.checks.joint_loops import with_loads
 
 
 @dataclass(frozen=True)

@@ -34,9 +34,18 @@ from ...harness.run import Progress, run
 from ...harness.verdict import NAMED
 from ...harness.workers.pool import in_workers
 from ...joints import Revolute
+from ...studies.checks.findings import (
+    Finding,
+    Limit,
+    Report,
+    Verdict,
+    agreement,
+    fault_finding,
+    judge_figures,
+    skip,
+)
 from ...trajectory import QUANTITIES, Array
 from .engine_cases import UnknownJoint, at_rate, force_cases, uneven_drives
-from .findings import Finding, Limit, Report, Verdict, agreement, fault_finding, judge_figures, skip
 
 Values: TypeAlias = Sequence[float | None] | None
 

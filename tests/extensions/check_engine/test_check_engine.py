@@ -12,20 +12,20 @@ import numpy as np
 import pytest
 from kincheck.core.case.joint_probe import probe
 from kincheck.core.cli import class_loading, main
+from kincheck.core.extensions.check_engine import check as checking
+from kincheck.core.extensions.check_engine import engine_cases as force_cases
+from kincheck.core.extensions.check_engine.check import rates
 from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Planar, Screw, Universal
-from kincheck.core.studies.checks import check_engine as checking
-from kincheck.core.studies.checks import engine_cases as force_cases
-from kincheck.core.studies.checks.check_engine import rates
 from kincheck.core.studies.checks.findings import Verdict
 
-from ..support.by_night import sparse_by_day
-from ..support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped
-from ..support.fakes import Fake, crank, swept
-from ..support.faulty_engine import Odd, Shy, Sound
+from ...support.by_night import sparse_by_day
+from ...support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped
+from ...support.fakes import Fake, crank, swept
+from ...support.faulty_engine import Odd, Shy, Sound
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 HERE = "tests.support.faulty_engine"
 
 
@@ -33,7 +33,9 @@ def reduce(monkeypatch, *joint_types, force_type):
     """Check these joint types, forces by one, and one topology."""
     monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in joint_types])
     monkeypatch.setattr(force_cases, "probes", lambda: [probe(force_type)])
-    monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {"one loop": "rssr"})
+    monkeypatch.setattr(
+        "kincheck.core.extensions.check_engine.command.TOPOLOGIES", {"one loop": "rssr"}
+    )
 
 
 @pytest.fixture
@@ -207,7 +209,7 @@ def test_check_engine_finds_fault_of_motion(fault, two, monkeypatch):
 @pytest.mark.parametrize("fault", sparse_by_day(OF_FORCES, 3))
 def test_check_engine_finds_fault_of_forces(fault, two, monkeypatch):
     monkeypatch.setattr(checking, "probes", list)
-    monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {})
+    monkeypatch.setattr("kincheck.core.extensions.check_engine.command.TOPOLOGIES", {})
     found = failures(Wrapped(fault))
     assert any(check.startswith("forces: ") for check in found)
     assert not any(check.startswith(("rates: ", "refusal: ")) for check in found)
