@@ -20,9 +20,9 @@ from kincheck.core.extensions.proofs import ball_executor
 from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.jet import arctan2
 
-from ..support.case_texts import refused
-from ..support.fakes import RADIUS, crank
-from ..support.mechanisms import BRANCH, chain
+from ...support.case_texts import refused
+from ...support.fakes import RADIUS, crank
+from ...support.mechanisms import BRANCH, chain
 
 flint = pytest.importorskip("flint")
 TOL = 1e-12

@@ -13,8 +13,8 @@ from kincheck.core.extensions.exports.model_writer import written
 from kincheck.core.extensions.trees.reader import read_tree
 from kincheck.core.extensions.trees.tree import sum_of_masses
 
-from ..support.engine_motion import motion_case
-from ..support.mechanisms import ORIGIN
+from ...support.engine_motion import motion_case
+from ...support.mechanisms import ORIGIN
 
 ROUNDINGS = 1e-13
 """Of the largest entry: a product of three matrices, an eigenvalue problem and its product back

@@ -9,9 +9,9 @@ from kincheck import adapters, cases
 from kincheck.core import JointAngle, Revolute, Spherical
 from kincheck.core.case.case import Sweep
 
-from ..oracles.naive import A
-from ..support.engine_motion import assert_motion, mechanism_of, rotation, solved
-from ..support.mechanisms import ORIGIN, Y
+from ...oracles.naive import A
+from ...support.engine_motion import assert_motion, mechanism_of, rotation, solved
+from ...support.mechanisms import ORIGIN, Y
 
 pytest.importorskip("opensim", reason="OpenSim is not installed: pip install 'kincheck[simbody]'")
 

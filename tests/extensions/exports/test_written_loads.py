@@ -28,9 +28,9 @@ from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement
 from scipy.spatial.transform import Rotation
 
-from ..support.engine_motion import motion_case
-from ..support.exported import IN_TREES, read
-from ..support.loads import six
+from ...support.engine_motion import motion_case
+from ...support.exported import IN_TREES, read
+from ...support.loads import six
 
 # The arm: masses [kg] and their places, global at design [m].
 MASSES = np.array([0.5, 0.75, 1.25, 0.3])

@@ -30,13 +30,13 @@ from kincheck.core.kinematics import NativeSolver, largest_residual
 from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation
 
-from ..oracles.naive import A
-from ..support.case_texts import write
-from ..support.engine_motion import cutting, mechanism_of
-from ..support.exported import READERS, read
-from ..support.mechanisms import mcpherson, slider_crank
-from ..support.model_files import driven
-from ..support.written_mechanisms import CASES, Z, assert_read, case, coupled_loop, way
+from ...oracles.naive import A
+from ...support.case_texts import write
+from ...support.engine_motion import cutting, mechanism_of
+from ...support.exported import READERS, read
+from ...support.mechanisms import mcpherson, slider_crank
+from ...support.model_files import driven
+from ...support.written_mechanisms import CASES, Z, assert_read, case, coupled_loop, way
 
 
 @pytest.mark.parametrize("to", offers("writers"))

@@ -16,8 +16,8 @@ from kincheck.core.extensions.laboratory.paper.operations import (
 )
 from kincheck.core.extensions.laboratory.paper.rows import PaperDot12
 
-from ..oracles import naive
-from ..support.specimens import (
+from ...oracles import naive
+from ...support.specimens import (
     LANES,
     alike,
     body,

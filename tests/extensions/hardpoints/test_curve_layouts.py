@@ -9,9 +9,9 @@ import pytest
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.extensions.hardpoints.suspension import Side
 
-from ..support.case_texts import refused
-from ..support.rods_of_templates import solved
-from ..support.suspension_files import strut_of_table
+from ...support.case_texts import refused
+from ...support.rods_of_templates import solved
+from ...support.suspension_files import strut_of_table
 
 TRAVEL = np.arange(-50, 51, 10)
 TOE = 0.3e-4 * TRAVEL**2 - 0.011 * TRAVEL

@@ -19,10 +19,10 @@ from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
 from kincheck.core.harness.workers.serve import pack
 
-from ..support.bad_engine import Bad
-from ..support.fake_command import Slow
-from ..support.fakes import Fake, crank, raising, run_case
-from .test_workers import timeless
+from ...harness.test_workers import timeless
+from ...support.bad_engine import Bad
+from ...support.fake_command import Slow
+from ...support.fakes import Fake, crank, raising, run_case
 
 TOL = 1e-12
 LIMITS = Limits(timeout=60.0, memory=1.0)

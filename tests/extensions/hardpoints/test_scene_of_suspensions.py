@@ -16,10 +16,10 @@ from kincheck.core.report.axis import Axis, driver_axis
 from kincheck.core.report.drawing import drawing
 from msgspec.structs import replace
 
-from ..oracles.naive import A
-from ..support.mechanisms import chain
-from ..support.strut_results import GRID, record, series
-from .test_report_scene import AXIS, STRUT, UP
+from ...oracles.naive import A
+from ...report.test_report_scene import AXIS, STRUT, UP
+from ...support.mechanisms import chain
+from ...support.strut_results import GRID, record, series
 
 
 @pytest.mark.parametrize(

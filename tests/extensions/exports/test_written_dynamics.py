@@ -11,8 +11,8 @@ from kincheck.core.extensions.exports.command import writer_of
 from kincheck.core.extensions.exports.model_writer import written
 from kincheck.core.extensions.free.free_dynamics import free_motion
 
-from ..support.engine_motion import motion_case
-from ..support.mechanisms import ORIGIN
+from ...support.engine_motion import motion_case
+from ...support.mechanisms import ORIGIN
 
 mujoco = pytest.importorskip("mujoco")
 
