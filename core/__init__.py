@@ -38,10 +38,8 @@ if TYPE_CHECKING:
     )
     from .kinematics import (
         Curve,
-        Designs,
         Event,
         solve,
-        solve_designs,
         trace,
     )
     from .mechanism.mechanism import GROUND, Body, Mechanism, Point
@@ -60,7 +58,6 @@ __all__ = [
     "ConstantVelocity",
     "Curve",
     "Cylindrical",
-    "Designs",
     "Distance",
     "Engine",
     "Event",
@@ -105,7 +102,6 @@ __all__ = [
     "check_joint",
     "clear_caches",
     "solve",
-    "solve_designs",
     "trace",
 ]
 
@@ -122,7 +118,7 @@ _NAMES = {
     ),
     "case.case": "Case",
     "case.io.reader_options": "Supplied",
-    "kinematics": ("Curve Designs Event solve solve_designs trace"),
+    "kinematics": ("Curve Event solve trace"),
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",
     "studies.checks.check_joint": "check_joint",

@@ -52,7 +52,7 @@ IMPORTS = {
     "kinematics": (
         ". kinematics/compiled kinematics/continuation "
         "kinematics/forces kinematics/formulation kinematics/structure "
-        "mechanism primitives program"
+        "mechanism primitives"
     ),
     "kinematics/compiled": (
         ". joints kinematics/forces kinematics/formulation kinematics/structure mechanism "

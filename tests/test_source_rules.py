@@ -14,7 +14,7 @@ SIMULATORS = {"mujoco", "pinocchio", "exudyn", "opensim", "pydrake", "dartpy"}
 
 
 NUMERICS = {
-    *("assemblies", "blocks", "code", "explain", "free", "laboratory", "llvm", "proofs"),
+    *("assemblies", "blocks", "code", "designs", "explain", "free", "laboratory", "llvm", "proofs"),
     *("residuals", "statics"),
 }
 """Extensions that walk or prove the equations in another way, and see the inside of kinematics."""
@@ -95,7 +95,7 @@ def test_sources_follow_rules(rule):
     assert found == {}
 
 
-INSIDE = {"kinematics", "llvm", "program", "test_joint_probe.py"}
+INSIDE = {"designs", "kinematics", "llvm", "program", "test_joint_probe.py"}
 """Below tests: those of the inside of kinematics, and of its programs."""
 
 

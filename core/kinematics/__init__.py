@@ -5,14 +5,13 @@ This module is the door to the native solver: code outside this folder imports f
 Solve:
 
     solve              one design over a sweep
-    solve_designs      many designs over a sweep, each with its own geometry
     forces_of          reactions of joints and efforts of drivers of a solved motion
     trace              a motion by its arc length, beyond lock-ups of a driver
     angle_with_turns   the angle of a joint, followed from the design
     attitude_with_turns
                        the attitude of a body, followed from the design
-    NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
-                       many designs (`prepare_designs`), and tells the size of its programs
+    NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`), and
+                       tells the size of its programs
 
 Describe:
 
@@ -44,8 +43,6 @@ if TYPE_CHECKING:
     from .compiled.request import LAST_ITERATION, WantedOutput
     from .compiled.routes import Start, notes_on_start, solve_from_start, start_of
     from .continuation.trace import Curve, Event, trace
-    from .design_batch import Designs, Variants, solve_designs
-    from .design_forces import ForcesOfDesigns
     from .followed import (
         DOUBTFUL,
         agreement,
@@ -68,7 +65,7 @@ if TYPE_CHECKING:
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
     from .formulation.styles import MIXED, NATIVE, formulate, styles
     from .motion_solver import Method, Solver
-    from .native_solver import NativeSolver, PreparedDesigns, ProgramSize
+    from .native_solver import NativeSolver, ProgramSize
     from .one_design import solve
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
@@ -77,8 +74,6 @@ _NAMES = {
     "compiled.request": "LAST_ITERATION WantedOutput",
     "compiled.routes": "Start notes_on_start solve_from_start start_of",
     "continuation.trace": "Curve Event trace",
-    "design_batch": "Designs Variants solve_designs",
-    "design_forces": "ForcesOfDesigns",
     "followed": (
         "DOUBTFUL agreement angle_with_turns attitude_with_turns follower in_doubt near_design"
     ),
@@ -90,7 +85,7 @@ _NAMES = {
     "formulation.constraints": "Frames Relation constraints unit_near",
     "formulation.styles": "MIXED NATIVE formulate styles",
     "formulation.parameters": "LoadPlace kinds load_places placed places",
-    "native_solver": "NativeSolver PreparedDesigns ProgramSize",
+    "native_solver": "NativeSolver ProgramSize",
     "motion_solver": "Method Solver",
     "one_design": "solve",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",

@@ -492,8 +492,9 @@ def component(name, k, moment, found):
 def test_design_variants_keep_undetermined_forces(tmp_path):
     file = rounded(tmp_path)
     mechanism, path = (case := load_case(file)).mechanism, case.sweep.path
-    designs = NativeSolver(order=2).prepare_designs(
-        mechanism, path, ["joints.c.point"], forces=[*"abcd", "turn"]
+    prepared = pytest.importorskip("kincheck.core.extensions.designs.prepared")
+    designs = prepared.prepare_designs(
+        NativeSolver(order=2), mechanism, path, ["joints.c.point"], forces=[*"abcd", "turn"]
     )
     geometry = np.array(mechanism.joint("c").point)[:, None] + np.outer([1, 0, 1], [0.0, 1e-3])
     found = designs.solve(geometry, 1e-12)

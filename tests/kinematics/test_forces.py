@@ -303,8 +303,9 @@ def case():
 
 def forces_of_designs(case, *, least=None):
     """The forces of three designs, and their geometry."""
-    designs = NativeSolver(order=2).prepare_designs(
-        case.mechanism, case.sweep.path, [PIN], forces=NAMES
+    prepared = pytest.importorskip("kincheck.core.extensions.designs.prepared")
+    designs = prepared.prepare_designs(
+        NativeSolver(order=2), case.mechanism, case.sweep.path, [PIN], forces=NAMES
     )
     pin = np.array(case.mechanism.joint("crank_pin").point)
     geometry = pin[:, None] + np.outer([1.0, 0.5, 0.0], [-1e-3, 0.0, 2e-3])

@@ -4,6 +4,6 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["exports", "sweep"],
+    needs=["designs", "exports", "sweep"],
     codes={"c": "c:files", "js": "js:files", "fmu": "fmu:files"},
 )

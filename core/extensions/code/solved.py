@@ -16,7 +16,6 @@ import numpy as np
 from ...algebra import Scalar
 from ...case.case import TIME as SWEPT_TIME
 from ...case.case import Case, Quantity
-from ...case.designs import DesignOutputs
 from ...case.measures import ForceMeasure, Orientation
 from ...errors import KincheckError, shortened
 from ...forces import Forces, Reaction
@@ -46,6 +45,7 @@ from ...kinematics.formulation.acceptance_criteria import LOW
 from ...mechanism.motions import Absolute, Motion, Ramp, Sine, Table
 from ...program import DONE, MARGIN, Program, Tape, program, where_larger
 from ...trajectory import QUANTITIES
+from ..designs.outputs import DesignOutputs
 from ..sweep.curves import moved_by
 from ..sweep.varied_places import Geometry
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from ...algebra import Vec3, vec
 from ...case.case import ORDERS, Case, Quantity, without_forces
-from ...case.designs import DesignOutputs
 from ...case.quantity import still_jets
 from ...harness.compare import numbers as as_numbers
 from ...jet import Jet
 from ...joints import Kind
 from ...mechanism.motions import PointCoordinate
 from ...trajectory import Array
+from ..designs.outputs import DesignOutputs
 from ..sweep.varied_places import Geometry, Variable
 from .conditioning import Conditioning, PoseConditioning
 

@@ -13,7 +13,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["code", "hardpoints", "sweep", "explain"],
+    needs=["code", "designs", "hardpoints", "sweep", "explain"],
     commands={"serve": "command:Serve"},
     public={"live": "command:Serve"},
     schemas={"live": "protocol:live_schema"},

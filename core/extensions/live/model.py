@@ -10,13 +10,13 @@ from time import perf_counter
 import numpy as np
 
 from ...case.case import HELD_BUT, SLOW, Case, size
-from ...case.designs import TOL
 from ...errors import KincheckError, SolveError, unknown
 from ...harness.compare import output_series
 from ...kinematics import NativeSolver
 from ...mechanism.motions import Path as Way
 from ...mechanism.motions import Ramp, Slowed
 from ...trajectory import Array
+from ..designs.outputs import TOL
 from ..explain.conditioning import conditioning
 from ..explain.diagnose import diagnose
 from .protocol import Answer, LiveDriver, Move, Opening, Pose, Reach, Reached, Solve

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...case.case import PER_TRAVEL, Case, without_forces
-from ...case.designs import DesignOutputs
 from ...case.quantity import Output, Quantity
 from ...errors import KincheckError, unknown
 from ...harness.labels import output_label
@@ -26,6 +25,7 @@ from ...report.axis import DISPLAY, Axis, driver_axis
 from ...report.drawing import drawing
 from ...trajectory import Array
 from ...unit_text import unit_text
+from ..designs.outputs import DesignOutputs
 from ..hardpoints.options import WheelOptions
 from ..hardpoints.read import case_of_hardpoints
 from ..hardpoints.reader import read_hardpoints

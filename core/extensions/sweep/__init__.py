@@ -4,7 +4,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["cluster"],
+    needs=["cluster", "designs"],
     commands={"sweep": "command:Sweep"},
     public={
         "DesignCurves": "curves:DesignCurves",

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...caches import cache_last
 from ...case.case import Case
-from ...case.designs import DesignOutputs
 from ...dataset import Dataset, Variable
 from ...driving import Driving, in_words
 from ...errors import CaseError, number_of, unknown
@@ -22,6 +21,7 @@ from ...joints import Kind
 from ...mechanism.motions import PointCoordinate
 from ...tabular import Tabular
 from ...trajectory import Array
+from ..designs.outputs import DesignOutputs
 from .varied_places import Geometry, PlaceError
 
 # Cases kept ready: for an optimisation that asks again and again, with and without slopes.

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...case.case import Case, Quantity, size
-from ...case.designs import DesignOutputs
 from ...errors import KincheckError
 from ...kinematics import placed
 from ...mechanism.motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
+from ..designs.outputs import DesignOutputs
 from .statistics import Summary, empty_summary, merge, summary_of
 from .study_choices import Mode
 from .variation import Stream, Variation, generator

@@ -9,6 +9,7 @@ from kincheck import cases
 from kincheck.core import (
     Point,
 )
+from kincheck.core.extensions.designs.prepared import prepare_designs
 from kincheck.core.extensions.explain.diagnose import diagnose
 from kincheck.core.kinematics import NativeSolver, places
 
@@ -34,8 +35,8 @@ def test_sensitivities_equal_central_differences(name, value):
     ]
     h = 1e-5 * np.eye(len(numbers))
     designs = np.array([x for _, _, x in numbers])[:, None] + np.concatenate([h, -h], axis=1)
-    ready = NativeSolver(order=0).prepare_designs(
-        mechanism, case.sweep.path, tuple(places(mechanism)), case.points
+    ready = prepare_designs(
+        NativeSolver(order=0), mechanism, case.sweep.path, tuple(places(mechanism)), case.points
     )
     solved = ready.solve(designs, 1e-13)
     assert solved.solved.all()

@@ -497,7 +497,7 @@ def test_axle_edit_divides_no_step(car, monkeypatch, axle, travel, whole):
     """
     live = LiveTable(car, Supplied(travel=travel, axle=axle))
     marches = []
-    march = "kincheck.core.kinematics.design_batch.follow_samples"
+    march = "kincheck.core.extensions.designs.design_batch.follow_samples"
     monkeypatch.setattr(march, lambda *_: marches.append(1))
     answer = live.solve(Solve(points=live.positions, whole=whole))
     ranking = live.rank(Rank(points=live.positions, output="left_toe"))

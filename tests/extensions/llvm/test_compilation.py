@@ -9,6 +9,7 @@ from time import sleep
 import numpy as np
 import pytest
 from kincheck.core import solve
+from kincheck.core.extensions.designs.design_batch import solve_variants
 from kincheck.core.extensions.llvm import jit as llvm
 from kincheck.core.extensions.llvm.jit import LlvmCode
 from kincheck.core.kinematics.compiled import compiled_model as models
@@ -16,7 +17,6 @@ from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.design_batch import solve_variants
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.mechanism.motions import Path, Ramp

@@ -9,6 +9,7 @@ import numpy as np
 from ....case.case import Case, without_forces
 from ....errors import KincheckError
 from ....kinematics import NativeSolver
+from ...designs.prepared import prepare_designs
 from ...sweep.curves import ReadyCurves, prepare_curves
 from .rounds import Spread, Work, take_turns
 
@@ -36,8 +37,8 @@ def measure(case: Case, rounds: int, tol: float = 1e-12) -> dict[str, object]:
     ready = prepare_curves(case, places)
     offsets = np.random.default_rng(SEED).normal(size=(DESIGNS, len(places))) * SCATTER
     geometry, varied = ready.geometry(offsets), ready.outputs.designs.route.model.request.varied
-    points = NativeSolver(order=0).prepare_designs(
-        case.mechanism, case.sweep.path, varied, case.points
+    points = prepare_designs(
+        NativeSolver(order=0), case.mechanism, case.sweep.path, varied, case.points
     )
     few = [each.name for each in case.outputs[:SLOPES]]
     sloped = prepare_curves(case, places[:PLACES], few, few)

@@ -17,9 +17,11 @@ import numpy as np
 from ....case.case import Case, size
 from ....harness.compare import output_series
 from ....joints import Kind
-from ....kinematics import NativeSolver, PreparedDesigns, Variants, kinds, places
+from ....kinematics import NativeSolver, kinds, places
 from ....program.executor import compiler
 from ....trajectory import PointMotion, Trajectory
+from ...designs.design_batch import Variants
+from ...designs.prepared import PreparedDesigns, prepare_designs
 from ...sweep.sweep import sweep_designs
 from ...sweep.variation import Coordinate, Law, Mode, Variation
 from .rounds import Peak, Spread, Work, spread, take_turns
@@ -64,7 +66,7 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
     """
     hardpoints = _every_hardpoint(case)
     varied, nominal = tuple(hardpoints.places), hardpoints.nominal
-    designs = NativeSolver().prepare_designs(case.mechanism, case.sweep.path, varied, case.points)
+    designs = prepare_designs(NativeSolver(), case.mechanism, case.sweep.path, varied, case.points)
     scatter = (
         np.random.default_rng(SEED).normal(size=(len(nominal), max(SIZES))) * SCATTER * size(case)
     )

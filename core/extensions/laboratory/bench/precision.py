@@ -14,11 +14,15 @@ import msgspec
 
 from ....case.case import Case, Truth
 from ....case.io.reference_file import series
+from ....errors import SolveError
 from ....harness.engine import Engine, Measurable
 from ....harness.native_engine import NativeEngine
 from ....harness.record import Outcome, Record
 from ....harness.run import run
 from ....kinematics import Method, NativeSolver, ProgramSize
+from ....kinematics.compiled.compiled_model import compile_model
+from ....kinematics.compiled.routes import Route
+from ....kinematics.continuation.walk import marcher
 from ....trajectory import Array, Trajectory
 from ...proofs.verified_reference import prove_case
 from .rounds import Spread, take_turns
@@ -350,8 +354,23 @@ def loops_alone(case: Case, tol: float) -> Callable[[], Array]:
     Raises:
         SolveError: a step must be halved, which needs Python.
     """
-    whole = level()
-    return whole.solver.loops(case.mechanism, case.sweep.path, case.points, whole.bodies(case), tol)
+    whole, path = level(), case.sweep.path
+    solver = whole.solver
+    request = solver.request(case.mechanism, path, case.points, whole.bodies(case))
+    route = Route(compile_model(case.mechanism, request), path)
+    track = marcher(route, tol, crossing=False).track
+
+    def work() -> Array:
+        kept = track.begin()
+        for went, side in zip(track.run(), route.sides, strict=True):
+            if went < side.count:
+                raise SolveError(
+                    f"mechanism {case.mechanism.name!r}: the loops alone end after {went} of"
+                    f" {side.count} samples on one side"
+                )
+        return kept
+
+    return work
 
 
 def program_size(case: Case) -> ProgramSize:

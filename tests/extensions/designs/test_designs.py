@@ -18,17 +18,17 @@ from kincheck.core import (
     solve,
     solve_designs,
 )
-from kincheck.core.kinematics import design_batch
+from kincheck.core.extensions.designs import design_batch
+from kincheck.core.extensions.designs.design_batch import solve_variants
 from kincheck.core.kinematics.compiled.compiled_model import compile_model, recent_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.design_batch import solve_variants
 from kincheck.core.kinematics.formulation.parameters import placed, places
 from kincheck.core.mechanism.motions import Path
 from kincheck.core.program import NODES
 
-from ..support.mechanisms import (
+from ...support.mechanisms import (
     BRANCH,
     chain,
     circles_meet,

@@ -13,20 +13,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..jet import Jet
-from ..kinematics import (
-    ForcesOfDesigns,
-    NativeSolver,
-    PreparedDesigns,
-    Variants,
-    WantedOutput,
-)
-from ..mechanism.motions import Path
-from ..trajectory import Array
-from .case import HELD_BUT, Case, Quantity
-from .measures import ForceMeasure, JointAngle, Orientation
-from .quantity import ORDERS
-from .turns import Completion, over_sweep
+from ...case.case import HELD_BUT, Case, Quantity
+from ...case.measures import ForceMeasure, JointAngle, Orientation
+from ...case.quantity import ORDERS
+from ...case.turns import Completion, over_sweep
+from ...jet import Jet
+from ...kinematics import NativeSolver, WantedOutput
+from ...mechanism.motions import Path
+from ...trajectory import Array
+from .design_batch import Variants
+from .design_forces import ForcesOfDesigns
+from .prepared import PreparedDesigns, prepare_designs
 
 TOL = 1e-12
 """Largest accepted residual, relative to the mechanism's size, as in `kincheck run`."""
@@ -63,7 +60,7 @@ class DesignOutputs:
         """Return a case with a compiled model.
 
         Args:
-            varied: varied places, see `NativeSolver.prepare_designs`.
+            varied: varied places, see `prepare_designs`.
             derivative: highest wanted time derivative; outputs have theirs as far as it is known.
             slopes: names of outputs whose slopes by the varied places are wanted.
             bodies: names of those whose poses are wanted.
@@ -94,7 +91,8 @@ class DesignOutputs:
             for each in wanted
             if not each.alone
         ]
-        designs = NativeSolver(order=max(orders, default=0)).prepare_designs(
+        designs = prepare_designs(
+            NativeSolver(order=max(orders, default=0)),
             case.mechanism,
             case.sweep.path,
             tuple(varied),

@@ -15,17 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..forces import Forces
-from ..trajectory import Array, BodyMotion, Motions, Trajectory
-from .compiled.compiled_model import Model, compile_model
-from .compiled.request import FORCE_SIGMA, SIGMA
-from .compiled.routes import Route
+from ...forces import Forces
+from ...kinematics.compiled.compiled_model import Model, compile_model
+from ...kinematics.compiled.request import FORCE_SIGMA, SIGMA
+from ...kinematics.compiled.routes import Route
+from ...kinematics.followed import follower
+from ...kinematics.forces.reactions import forces_of
+from ...kinematics.forces.wanted import WantedForces
+from ...kinematics.motion_solver import ONE_PROGRAM
+from ...kinematics.one_design import motion_only, prepare
+from ...trajectory import Array, BodyMotion, Motions, Trajectory
 from .design_batch import Variants, solve_variants, variant_of
-from .followed import follower
-from .forces.reactions import forces_of
-from .forces.wanted import WantedForces
-from .motion_solver import ONE_PROGRAM
-from .one_design import motion_only, prepare
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,19 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..algebra import Vec3
-from ..dataset import Dataset, Variable
-from ..driving import Driving, in_words
-from ..errors import SolveError, number_of
-from ..input_checks import no_such, real
-from ..jet import Jet
-from ..mechanism.mechanism import Mechanism
-from ..mechanism.motions import Motion, Path
-from ..program import ITERATIONS
-from ..tabular import Tabular
-from ..trajectory import QUANTITIES, Array, PointMotion, Trajectory, as_variables
-from .compiled.compiled_model import Executor, Model
-from .compiled.request import (
+from ...algebra import Vec3
+from ...dataset import Dataset, Variable
+from ...driving import Driving, in_words
+from ...errors import SolveError, number_of
+from ...input_checks import no_such, real
+from ...jet import Jet
+from ...kinematics.compiled.compiled_model import Executor, Model
+from ...kinematics.compiled.request import (
     LARGEST,
     OUTPUT,
     RESTING,
@@ -41,13 +36,18 @@ from .compiled.request import (
     accept_by,
     slots_of,
 )
-from .compiled.routes import SAME_TIME, Route, recent_route
-from .continuation.walk import FINER, ROOM, follow_samples
-from .formulation.acceptance_criteria import is_uncertain
-from .formulation.parameters import every_place, placed, places
-from .motion_solver import ONE_PROGRAM
-from .one_design import driving_of, parse_solve_arguments, prepare, start_notes
-from .structure.degrees_of_freedom import require_driven
+from ...kinematics.compiled.routes import SAME_TIME, Route, recent_route
+from ...kinematics.continuation.walk import FINER, ROOM, follow_samples
+from ...kinematics.formulation.acceptance_criteria import is_uncertain
+from ...kinematics.formulation.parameters import every_place, placed, places
+from ...kinematics.motion_solver import ONE_PROGRAM
+from ...kinematics.one_design import driving_of, parse_solve_arguments, prepare, start_notes
+from ...kinematics.structure.degrees_of_freedom import require_driven
+from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Motion, Path
+from ...program import ITERATIONS
+from ...tabular import Tabular
+from ...trajectory import QUANTITIES, Array, PointMotion, Trajectory, as_variables
 
 # Steps of the straight way from the design to a start away from it: a sixteenth of it is a step
 # like those of a sweep, and a lane for which it is too long is solved again alone.
