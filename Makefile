@@ -12,10 +12,11 @@ UV := $(shell command -v uv 2>/dev/null)
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
 
+# One process checks the types, beside the tests.
 test: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(MAKE) --jobs 2 types tests # one process checks the types, beside the tests
+	$(MAKE) --jobs 2 types tests
 
 types: .venv/ready
 	$(BIN)/pyright --pythonpath $(BIN)/python
