@@ -16,6 +16,7 @@ from kincheck.core.case.case import TIME, Case, Output, Sweep, Truth
 from kincheck.core.joints import Distance, Fixed, Revolute, Spherical, Translational, Universal
 from kincheck.core.mechanism.tree import SpanningTree, spanning_tree
 
+from .joint_loops import TYPES
 from .mechanisms import X
 
 TOL = 1e-12
@@ -39,6 +40,13 @@ IN_TREE_OR_CUT = pytest.mark.parametrize(
 # mechanisms at these speeds. Exudyn's accelerations rest on differences.
 TOLERANCES = (1e-13, 1e-12, 1e-11)
 EXUDYN_TOLERANCES = (1e-12, 1e-11, 1e-9)
+
+
+def way_by_day(engine, kind):
+    """Return the way that the tests of a change solve a joint in a simulator, in turn: 2 or 3 with
+    the bodies in the other order, 1 or 3 with the joint cut.
+    """
+    return (SIMULATORS.index(engine) + TYPES.index(kind)) % 4
 
 
 def installed(name, mode="projection"):

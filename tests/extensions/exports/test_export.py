@@ -1,7 +1,7 @@
 """Exports: the command, the writers, and exports read again."""
 
-import os
 from dataclasses import replace
+from itertools import product
 from xml.etree import ElementTree
 
 import numpy as np
@@ -31,6 +31,7 @@ from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation
 
 from ...oracles.naive import A
+from ...support.by_night import sparse_by_day
 from ...support.case_texts import write
 from ...support.engine_motion import cutting, mechanism_of
 from ...support.exported import READERS, read
@@ -191,10 +192,9 @@ NO_CURVE = {"exudyn": "Exudyn", "sdf": "SDF"}
 NOT_WRITTEN = {"polynomial": NO_CURVE, "spline": NO_CURVE | {"mjcf": "MJCF"}}
 
 
-@pytest.mark.parametrize("elsewhere", [False, True], ids=["design", "elsewhere"])
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("to", READERS)
-def test_written_model_closes_at_native_pose(to, name, elsewhere, tmp_path):
+@pytest.mark.parametrize("which", sparse_by_day(product(READERS, CASES, (False, True)), 3), ids=str)
+def test_written_model_closes_at_native_pose(which, tmp_path):
+    to, name, elsewhere = which
     if refused := NOT_WRITTEN.get(name, {}).get(to):
         with pytest.raises(KincheckError, match=f"has no counterpart in {refused}"):
             reading(to, name, tmp_path, elsewhere)
@@ -214,10 +214,15 @@ def test_polynomial_coupler_shifted_to_start():
     np.testing.assert_allclose(moved.coefficients, [0.0, 1.2, 0.2], rtol=0.0, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", [each.name for each in probes()])
-@pytest.mark.parametrize("to", ["mjcf", "urdf", "sdf", "osim"])
-def test_written_joint_closes_loop(to, name, tmp_path):
+JOINTS = [each.name for each in probes()]
+
+
+@pytest.mark.parametrize(
+    "which", sparse_by_day(product(JOINTS, ["mjcf", "urdf", "sdf", "osim"]), 3), ids="-".join
+)
+def test_written_joint_closes_loop(which, tmp_path):
     """As it carries a body elsewhere."""
+    name, to = which
     if to in NOT_WRITTEN.get(name, ()):
         return  # refused above
     mechanism = CASES[name].mechanism
@@ -254,13 +259,7 @@ def test_written_model_shows_wrong_start(to, tmp_path):
 
 
 TREES = ("mjcf", "urdf", "sdf")
-NAMES = cases.names()
-ALL = os.environ.get("KINCHECK_EXPORTS") == "all"
-PAIRS = [
-    (name, each)
-    for k, name in enumerate(NAMES)
-    for each in (TREES if ALL else [TREES[k % len(TREES)]])
-]
+PAIRS = list(product(cases.names(), TREES))
 # Round-off of metre-sized coordinates, and of angles between links at arms of their size.
 EXACT = 1e-10
 STEP = 0.02
@@ -317,8 +316,9 @@ def test_urdf_loop_read_again_moves_alike(name, tmp_path):
     assert max(np.ptp(motion.p, axis=0).max() for motion in motions.values()) > 1e-5
 
 
-@pytest.mark.parametrize(("name", "kind"), PAIRS)
-def test_export_read_again_moves_alike(name, kind, tmp_path):
+@pytest.mark.parametrize("pair", sparse_by_day(PAIRS, 5), ids="-".join)
+def test_export_read_again_moves_alike(pair, tmp_path):
+    name, kind = pair
     case = cases.load(name)
     again = read_again(case, exported(case, kind, tmp_path))
     motions = carried(case, again)
