@@ -28,35 +28,32 @@ BOX = 0.015
 
 
 def turned(w, x):
-    """Turn vectors by a rotation vector (Rodrigues)."""
-    angle = np.linalg.norm(w)
-    if angle < 1e-14:
-        return x + np.cross(w, x)
+    """Turn vectors by rotation vectors, shape (..., 3) each (Rodrigues)."""
+    angle = np.maximum(np.linalg.norm(w, axis=-1, keepdims=True), 1e-14)
     k = w / angle
-    across = np.cross(k, x)
-    return x + np.sin(angle) * across + (1.0 - np.cos(angle)) * np.cross(k, across)
+    along = k * np.sum(k * x, axis=-1, keepdims=True)
+    return along + np.cos(angle) * (x - along) + np.sin(angle) * np.cross(k, x)
 
 
-def wheel(points, travel):
-    """Return toe and camber: six equations of the knuckle's pose by Newton's method."""
+def wheel(points, travel=TRAVEL):
+    """Return toe and camber at each travel: six equations of the pose by Newton's method."""
     center = points["wheel_center"]
+    inner, outer = (np.array([points[rod[k]] for rod in RODS]) for k in (0, 1))
+    rest = np.sum((outer - inner) ** 2, axis=-1)
 
     def rows(q):
-        found = []
-        for inner, outer in RODS:
-            now = center + q[:3] + turned(q[3:], points[outer] - center) - points[inner]
-            rest = points[outer] - points[inner]
-            found.append(now @ now - rest @ rest)
-        return np.array([*found, q[2] - travel])
+        ends = center + q[..., None, :3] + turned(q[..., None, 3:], outer - center)
+        lengths = np.sum((ends - inner) ** 2, axis=-1) - rest
+        return np.concatenate([lengths, q[..., 2:3] - travel[:, None]], axis=-1)
 
-    q, step = np.zeros(6), 1e-7
+    q, steps = np.zeros((len(travel), 6)), 1e-6 * np.eye(6)[:, None]
     for _ in range(30):
-        slopes = [(rows(q + step * e) - rows(q - step * e)) / (2.0 * step) for e in np.eye(6)]
-        change = np.linalg.solve(np.array(slopes).T, rows(q))
+        slopes = np.moveaxis((rows(q + steps) - rows(q - steps)) / 2e-6, 0, -1)
+        change = np.linalg.solve(slopes, rows(q)[..., None])[..., 0]
         q = q - change
         if np.abs(change).max() < 1e-13:
             break
-    x, y, z = turned(q[3:], np.array([0.0, 1.0, 0.0]))
+    x, y, z = turned(q[:, 3:], np.array([0.0, 1.0, 0.0])).T
     return np.arctan2(x, y), -np.arcsin(z)
 
 
@@ -70,8 +67,8 @@ def moved(offsets, places=PLACES):
 
 def beyond(u):
     """Return the margins of all bands, over their half-widths; positive within."""
-    found = np.array([wheel(moved(u * BOX), z) for z in TRAVEL])
-    off = np.append(found[:, 0] / (0.02 * DEG), (found[-1, 1] + 1.15 * DEG) / (0.02 * DEG))
+    toe, camber = wheel(moved(u * BOX))
+    off = np.append(toe, camber[-1] + 1.15 * DEG) / (0.02 * DEG)
     return np.concatenate([1.0 - off, 1.0 + off])
 
 
@@ -99,7 +96,7 @@ def tune(car, goals, *moves):
     return status, json.loads(found.read_text()), new
 
 
-@pytest.mark.parametrize("starts", [5, pytest.param(20, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("starts", [2, pytest.param(20, marks=pytest.mark.nightly)])
 def test_tune_agrees_with_another_optimiser(car, starts):
     moves = "tierod_inner: y z +- 15mm", "tierod_outer, uca_outer: z +- 15 mm"
     status, found, new = tune(car, GOALS, *moves)
@@ -152,8 +149,7 @@ def test_tune_small_box_is_unreachable(car, capsys):
     assert "Forbidden by 'toe = 0 +- 0.02 deg'" in capsys.readouterr().out
     scan = np.linspace(-0.9 * needed, 0.9 * needed, 41)
     excess = [
-        max(abs(wheel(moved([z], ["tierod_inner z"]), t)[0]) for t in TRAVEL) / (0.02 * DEG) - 1.0
-        for z in scan
+        np.abs(wheel(moved([z], ["tierod_inner z"]))[0]).max() / (0.02 * DEG) - 1.0 for z in scan
     ]
     assert found["bands"][0]["excess"] == pytest.approx(min(excess), abs=1e-3)
     assert min(excess) > 0.0
@@ -178,7 +174,7 @@ def test_tune_box_ends_where_stated(car, capsys):
 def test_tune_follows_measured_curve(car):
     offset = [0.003, -0.004]
     places = ["tierod_inner y", "tierod_inner z"]
-    curve = [(z, wheel(moved(offset, places), z)[0]) for z in TRAVEL]
+    curve = zip(TRAVEL, wheel(moved(offset, places))[0], strict=True)
     rig = car.with_name("rig.csv")
     rows = [f"{float(1e3 * z)!r},{float(toe / DEG)!r}" for z, toe in curve]
     rig.write_text("stroke [mm],toe [deg]\n" + "\n".join(rows) + "\n")
