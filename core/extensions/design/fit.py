@@ -20,7 +20,7 @@ from ...errors import KincheckError, unknown
 from ...harness.suspects import FACTORS
 from ...report.axis import ZERO
 from ...trajectory import Array
-from .goals import read_box, read_moves
+from .goals import read_box, read_moves, travel_of
 from .identify import Combination, combinations, source, without_effect
 from .likely import Estimate, most_likely
 from .rig import ROUND_OFF, Rig, RigModel, read_rig, with_scatter
@@ -162,7 +162,7 @@ class Fitted:
     def told_at(self, prediction: Prediction) -> int:
         """Return the sample to tell of: the one nearest to design, unless all is known there."""
         drawn = np.nan_to_num(prediction.drawing)
-        order = np.argsort(np.abs(self.rig.travel(self.rig.goals[0])[1]), kind="stable")
+        order = np.argsort(np.abs(self.rig.case.sweep.values), kind="stable")
         return next(int(k) for k in order if drawn[k] > 0.01 * drawn.max())
 
     @property
@@ -282,25 +282,25 @@ def _offsets(model: RigModel, estimate: Estimate) -> Iterator[Shift]:
     values = rig.of(model.values(estimate.u))
     for goal in rig.goals:
         rows = rig.rows(goal) * rig.weights
-        yield Shift(f"{goal.output} zero", rows, 0.0, np.inf, rig.unit(goal), 1.0)
+        yield Shift(f"{goal.output} zero", rows, 0.0, np.inf, goal.unit, 1.0)
         if (rows * values).any():
             yield Shift(f"{goal.output} scale", rows * values, 0.0, np.inf, percent, 1.0)
     if (slopes := model.by_travel(estimate.u)) is not None:
         along = -slopes * rig.weights
         travel = np.array([rig.case.sweep.change[k] for _, k in rig.places])
-        yield Shift("travel zero", along, 0.0, np.inf, rig.travel(rig.goals[0])[2], 1.0)
+        yield Shift("travel zero", along, 0.0, np.inf, travel_of(rig.case)[1], 1.0)
         yield Shift("travel scale", along * travel, 0.0, np.inf, percent, 1.0)
 
 
 def _samples(rig: Rig) -> Iterator[Shift]:
     """Yield each number as a shift of its own."""
+    _, unit = travel_of(rig.case)
     for k, (goal, at) in enumerate(rig.places):
-        _, values, unit = rig.travel(goal)
-        where = f"{values[at] / unit.size:.4g} {unit.name}"
+        where = f"{rig.case.sweep.values[at] / unit.size:.4g} {unit.name}"
         direction = np.zeros(rig.count)
         direction[k] = rig.weights[k]
         name = f"{goal.output} at {where}"
-        yield Shift(name, direction, 0.0, np.inf, rig.unit(goal), 1.0)
+        yield Shift(name, direction, 0.0, np.inf, goal.unit, 1.0)
 
 
 def _sized(shift: Shift, estimate: Estimate) -> Shift:
@@ -333,13 +333,13 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
     slips = dict[str, Rig]()
     for goal in rig.goals:
         slips[f"{goal.output} negated"] = rig.times({goal.output: -1.0})
-        others = _LENGTHS if goal.unit[0] in ANGLES else _ANGLES
+        others = _LENGTHS if goal.unit.name in ANGLES else _ANGLES
         for name, factor in FACTORS.items():
             if any(each in name for each in others):
                 continue
             slips[f"{goal.output} times {name}"] = rig.times({goal.output: factor})
     for one, other in pairs(rig.goals, 2):
-        if one.unit == other.unit and one.at.tolist() == other.at.tolist():
+        if one.unit.name == other.unit.name and one.at.tolist() == other.at.tolist():
             middle = {one.output: other.middle, other.output: one.middle}
             goals = [replace(g, middle=middle.get(g.output, g.middle)) for g in rig.goals]
             slips[f"{one.output} and {other.output} exchanged"] = replace(rig, goals=goals)

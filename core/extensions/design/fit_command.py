@@ -12,12 +12,11 @@ from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
 from ...errors import refuse
 from ...options import destination, group, json_file, option, options
-from .new_table import require_new, table_of, write_new
+from .new_table import NewTable, require_new, table_of
 
 DRAWING = "+- 2 mm"
 
 if TYPE_CHECKING:
-    from ...case.case import Case
     from ...trajectory import Array
     from .fit import Fitted, Shift
 
@@ -68,11 +67,9 @@ class Fit(OfCase):
             KincheckError: a file or an option makes no sense, or the table does not reach the
                 travel of the rig.
         """
-        return self._fitted(table_of(self, registry)[0])
-
-    def _fitted(self, case: Case) -> Fitted:
         from .fit import fit
 
+        case = table_of(self, registry)
         return fit(case, Path(self.measured), self.curve, self.drawing, self.move, self.free)
 
     def run(self, registry: Registry) -> int:
@@ -85,11 +82,12 @@ class Fit(OfCase):
 
         require_new(self.out)
         refuse(self.unwritable())
-        case, file = table_of(self, registry)
-        found = self._fitted(case)
+        found = self.answer(registry)
         fits, checked = found.verdict is not Verdict.OFF, None
         if fits and self.out is not None:
-            checked = write_new(self.out, case, file, self.supplied, found.moves, registry)
+            new = NewTable.of(self, found.rig.case, found.moves)
+            checked = new.check(registry)
+            new.write(self.out)
         if self.page is not None:
             write("--page", self.page, page(found).encode())
         with with_json(facts(found, self.out if fits else None, checked), self.json) as console:

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...case.case import Case
+from ...case.case import TIME, Case
 from ...case.io.document import measure
 from ...case.io.reader_options import CurveOptions
 from ...case.io.reference_curve import with_curve
 from ...case.io.table import read_unit
 from ...case.models.files import load
-from ...case.units import LENGTHS, Unit
+from ...case.units import LENGTHS, SECOND, Unit
 from ...cli.shared_options import driver_value
 from ...errors import CaseError, KincheckError, unknown
 from ...trajectory import Array
@@ -44,7 +44,7 @@ class Goal:
 
     Attributes:
         text: as the user wrote it.
-        unit: in which the user gave it, and its size [SI].
+        unit: in which the user gave it.
         at: indices of the samples at which the band holds.
         middle: of the band at these samples [SI].
         tolerance: half-width of the band [SI].
@@ -52,7 +52,7 @@ class Goal:
 
     text: str
     output: str
-    unit: tuple[str, float]
+    unit: Unit
     at: NDArray[np.intp]
     middle: Array
     tolerance: float
@@ -93,7 +93,7 @@ def read_goals(
         KincheckError: a goal has another form, there is no such output, or a travel or a curve lies
             beyond the sweep.
     """
-    drafts = [_draft(text, case) for text in texts]
+    drafts = [each for text in texts for each in _drafts(text, case)]
     values, span = case.sweep.values, sorted((case.sweep.values[0], case.sweep.values[-1]))
     for each in drafts:
         if each.travel is None or np.abs(values - each.travel).min() <= SAME:
@@ -124,8 +124,7 @@ def read_goals(
                 f"goal {each.text!r}: the curve has no value within the travel; give another"
                 " --travel"
             )
-        unit_name = each.unit.name, each.unit.size
-        goals.append(Goal(each.text, each.output, unit_name, whole, middle[whole], each.tolerance))
+        goals.append(Goal(each.text, each.output, each.unit, whole, middle[whole], each.tolerance))
     return case, goals, notes
 
 
@@ -185,7 +184,8 @@ def read_box(text: str, what: str, case: Case) -> Box:
     return Box(low, high)
 
 
-def _draft(text: str, case: Case) -> _Draft:
+def _drafts(text: str, case: Case) -> list[_Draft]:
+    """Return the goal of a text; of an axle, those of both wheels if it names none."""
     read = _GOAL.fullmatch(text)
     if read is None:
         raise KincheckError(
@@ -193,7 +193,9 @@ def _draft(text: str, case: Case) -> _Draft:
             ' "toe = 0 +- 0.05 deg", or a file of a curve in place of the value'
         )
     names = [each.name for each in case.outputs if not each.forces]
-    if read["output"] not in names:
+    sides = [f"{side}_{read['output']}" for side in ("left", "right")]
+    outputs = sides if {*sides} <= {*names} else [read["output"]]
+    if outputs[0] not in names:
         raise KincheckError(f"goal {text!r}: {unknown('output', read['output'], names)}")
     number = _NUMBER.fullmatch(read["tolerance"])
     if number is None or not 0.0 < float(number[1]) < np.inf:
@@ -201,12 +203,13 @@ def _draft(text: str, case: Case) -> _Draft:
             f"goal {text!r}: found the tolerance {read['tolerance']!r}, expected a positive number"
             " with a unit; say +- 0.05 deg"
         )
-    unit = _unit(text, number[2], case, read["output"])
+    unit = _unit(text, number[2], case, outputs[0])
     try:
         travel = driver_value(read["at"], case)
     except KincheckError as error:
         raise KincheckError(f"goal {text!r}: {str(error).removeprefix('--at: ')}") from None
-    return _Draft(text, read["output"], travel, read["value"], unit, unit.size * float(number[1]))
+    tolerance = unit.size * float(number[1])
+    return [_Draft(text, each, travel, read["value"], unit, tolerance) for each in outputs]
 
 
 def _unit(text: str, name: str, case: Case, output: str) -> Unit:
@@ -219,6 +222,14 @@ def _unit(text: str, name: str, case: Case, output: str) -> Unit:
         f"goal {text!r}: found the unit {name!r}, expected one of {output}, such as"
         f" {_of_table(si, case)}; correct it"
     )
+
+
+def travel_of(case: Case) -> tuple[str, Unit]:
+    """Return the name of the travel, and its unit in the table."""
+    driver = case.sweep.driver
+    if driver == TIME:
+        return TIME, SECOND
+    return driver, unit_in_table("rad" if case.mechanism.driver(driver).turns else "m", case)
 
 
 def unit_in_table(si: str, case: Case) -> Unit:

@@ -14,12 +14,12 @@ import numpy as np
 from ...case.case import PER_TRAVEL, TIME, Case, Output
 from ...case.io.reader_options import CurveOptions
 from ...case.io.reference_curve import with_curve
-from ...case.units import SECOND, Unit
+from ...case.units import Unit
 from ...errors import KincheckError
 from ...trajectory import Array
 from ..sweep.curves import DesignCurves, curves
 from .goals import Goal, unit_in_table
-from .tune import Search
+from .search import Search
 
 DEGREE, FEWEST = 6, 9
 """A polynomial of this degree follows what is left of a curve beside that of a near design; with
@@ -83,18 +83,6 @@ class Rig:
     def move(self) -> Unit:
         """The unit in which moves are told."""
         return unit_in_table("m", self.case)
-
-    def travel(self, goal: Goal) -> tuple[str, Array, Unit]:
-        """Return name, values and unit of the samples of an output."""
-        sweep = self.case.sweep
-        if sweep.driver == TIME:
-            return TIME, sweep.values, SECOND
-        turns = self.case.mechanism.driver(sweep.driver).turns
-        return sweep.driver, sweep.values, unit_in_table("rad" if turns else "m", self.case)
-
-    def unit(self, goal: Goal) -> Unit:
-        """Return the unit of an output as the table has it."""
-        return self.unit_of(goal.output)
 
     def unit_of(self, output: str) -> Unit:
         """Return the unit of an output by its name, as the table has it."""
@@ -211,10 +199,9 @@ def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
         if series is None or each.forces:
             continue
         at = np.flatnonzero(np.isfinite(series.position))
-        unit = unit_in_table(each.unit, case)
         digits = EVEN * series.uncertainty.get("position", np.zeros(len(series.position)))[at]
         stated = each.atol if each.why != known[each.name] else 0.0
-        named = each.name, each.name, (unit.name, unit.size)
+        named = each.name, each.name, unit_in_table(each.unit, case)
         goals.append(Goal(*named, at, series.position[at], 1.0))
         noise.append(np.hypot(digits, stated))
         sources.append("as stated" if stated else "printed digits")
@@ -244,7 +231,7 @@ def with_scatter(rig: Rig, drawn: Mapping[str, Array]) -> Rig:
     """
     noise, sources = [*rig.noise], [*rig.sources]
     for k, goal in enumerate(rig.goals):
-        travel = rig.travel(goal)[1][goal.at]
+        travel = rig.case.sweep.values[goal.at]
         count = len({*travel.tolist()})
         if sources[k] != "as stated" and count >= FEWEST:
             off, degree = goal.middle - drawn[goal.output][goal.at], min(DEGREE, count // 3)
@@ -255,9 +242,8 @@ def with_scatter(rig: Rig, drawn: Mapping[str, Array]) -> Rig:
             if scatter > SCATTER * float(np.median(noise[k])):
                 noise[k], sources[k] = np.hypot(noise[k], scatter), "scatter of its samples"
         if not noise[k].all():
-            unit = rig.unit(goal)
             raise KincheckError(
                 f"{rig.file}: {goal.output} has all digits, so its noise is not known; state it:"
-                f' --accuracy "{goal.output}=0.01 {unit.name}"'
+                f' --accuracy "{goal.output}=0.01 {goal.unit.name}"'
             )
     return replace(rig, noise=noise, sources=sources)
