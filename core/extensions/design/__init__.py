@@ -8,5 +8,6 @@ EXTENSION = Extension(
     __name__,
     needs=["compare", "hardpoints", "sweep"],
     commands={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},
+    proposals={"tune": "proposal:propose"},
     public={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},
 )

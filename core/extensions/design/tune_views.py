@@ -30,22 +30,28 @@ def report(found: Tuned, checked: str | None = None, others: Sequence[Section] =
         f"{number_of(found.rounds, 'round')}, {number_of(found.designs, 'design')}",
         f"{ends} end here, the search is local",
     ]
-    head = f"reached, norm {found.move.norm:.6g}"
     if found.reached:
         facts += [f"solved again by {checked}" if checked else "no other engine can check it"]
-    else:
-        proof = "proved" if found.proved else "not proved"
-        by = " and ".join(map(repr, found.forbidding))
-        head = f"not reached ({proof}), forbidden by {by}"
     sections = [_bands(found), _moves(found), *others]
-    return Report("tune", f"{found.case.name}: {head}", facts, sections)
+    return Report("tune", f"{found.case.name}: {headline(found)}", facts, sections)
+
+
+def headline(found: Tuned) -> str:
+    """Return whether the target is reached, and else what forbids it."""
+    if found.reached:
+        return f"reached, norm {found.move.norm:.6g}"
+    proof = "proved" if found.proved else "not proved"
+    return f"not reached ({proof}), forbidden by {' and '.join(map(repr, found.forbidding))}"
 
 
 def _bands(found: Tuned) -> Section:
     rows = [
         [
             each.goal.text,
-            *(" to ".join(number(x / each.goal.unit.size) for x in ends) for ends in each.ranges),
+            *(
+                " to ".join(dict.fromkeys(number(x / each.goal.unit.size) for x in ends))
+                for ends in each.ranges
+            ),
             each.goal.unit.name,
             *_edge(found, each),
         ]
