@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from itertools import combinations as pairs
 from math import erfc, log
 from pathlib import Path
@@ -20,10 +21,11 @@ from ...errors import KincheckError, unknown
 from ...harness.suspects import FACTORS
 from ...report.axis import ZERO
 from ...trajectory import Array
-from .goals import read_box, read_moves, travel_of
+from .goals import Movable, points_of, read_box, read_moves, travel_of
 from .identify import Combination, combinations, source, without_effect
 from .likely import Estimate, most_likely
 from .rig import ROUND_OFF, Rig, RigModel, read_rig, with_scatter
+from .rubber import PERCENT, rates_of
 
 ALPHA = 0.01
 """Data are off, if such ones have a smaller probability."""
@@ -198,7 +200,8 @@ def fit(
         KincheckError: the file or an option makes no sense, or the table does not reach the travel
             of the rig.
     """
-    boxes = _boxes(case, drawing, moves)
+    soft = bool(case.mechanism.bushings)
+    boxes = _boxes(rates_of(case) if soft else points_of(case), drawing, moves)
     return fit_rig(read_rig(case, file, options), boxes, free, every=not moves)
 
 
@@ -220,17 +223,19 @@ def fit_rig(
             f"{rig.file}: a measured output has no slope by the points of {rig.case.name} at a"
             " sample; leave its column out"
         )
-    # at a drawing with round numbers an effect may be zero by chance
-    near = model(np.random.default_rng(0).uniform(-0.5, 0.5, len(boxes))) or given
-    size = np.abs(near[1]).max(axis=0)
-    idle = [place for place, x in zip(boxes, size, strict=True) if x <= ROUND_OFF * size.max()]
-    if idle and every:
+    idle = list[str]()
+    if every:  # at a drawing with round numbers an effect may be zero by chance
+        near = model(np.random.default_rng(0).uniform(-0.5, 0.5, len(boxes))) or given
+        size = np.abs(near[1]).max(axis=0)
+        idle = [
+            x for x, known in zip(boxes, size > ROUND_OFF * size.max(), strict=True) if not known
+        ]
         boxes = {place: box for place, box in boxes.items() if place not in idle}
         model = rig.model(boxes)
     if not boxes:
         raise KincheckError(f"{rig.file}: nothing measured follows a point of {rig.case.name}")
 
-    freed = _named(free, [*_offsets(model, _estimate(model, []))])
+    freed = _named(free, [*_offsets(model, _estimate(model, []))]) if free else []
     first = estimate = _estimate(model, freed)
     slips = [*_slips(model, first)] if first.probability < ALPHA else []
     found = list[Shift]()
@@ -254,15 +259,14 @@ def fit_rig(
         [_alone(each, k, every_shift, estimate) for k, each in enumerate(found, len(freed))],
         *(worst.words, slips or [*_slips(model, estimate)], combinations(estimate, boxes)),
         without_effect(*model.over_travel(estimate.u), rig.case, moves, box),
-        *(idle if every else (), predictions(model, estimate)),
+        *(idle, predictions(model, estimate)),
     )
 
 
-def _boxes(case: Case, drawing: str, moves: Sequence[str]) -> dict[str, float]:
-    usual = read_box(drawing, f"--drawing {drawing!r}", case)
-    rows = [each.name for each in case.hardpoints if each.moves]
-    every = {f"{row} {axis}": usual for row in rows for axis in "xyz"}
-    found = read_moves(moves, case, drawing) if moves else every
+def _boxes(movable: Movable, drawing: str, moves: Sequence[str]) -> dict[str, float]:
+    usual = read_box(drawing, f"--drawing {drawing!r}", movable)
+    every = {f"{row} {axis}": usual for row in movable.rows.values() for axis in "xyz"}
+    found = read_moves(moves, movable, drawing) if moves else every
     for place, box in found.items():
         if -box.low != box.high:
             raise KincheckError(f"move {place}: a deviation is the same both ways; say +- 2 mm")
@@ -355,7 +359,9 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
         free = estimate.free * (slipped.weights / rig.weights)[:, None]
         if _linear_misfit(replace(estimate, off=off, slopes=slopes)) > _HOPELESS * rig.count:
             continue
-        found = most_likely(changed, np.zeros(len(box)), free)
+        # a study of rates takes a hundred times as long as a design, so the slopes do
+        linear = partial(_linear, estimate.u, off, slopes) if rig.move is PERCENT else changed
+        found = most_likely(linear, np.zeros(len(box)), free)
         if found is not None and found.probability >= ALPHA:
             largest = float(np.abs(found.u).max())
             fits.append((found.evidence, Slip(name, found.probability, largest)))
@@ -366,6 +372,10 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
     for each, slip in fits:
         if " times " not in slip.name or each <= best + LESS:
             yield slip
+
+
+def _linear(at: Array, off: Array, slopes: Array, u: Array) -> tuple[Array, Array]:
+    return off + slopes @ (u - at), slopes
 
 
 def _linear_misfit(estimate: Estimate) -> float:

@@ -16,6 +16,7 @@ from . import pages
 from .fit import ALPHA, NORMAL, Fitted, Verdict
 from .goals import travel_of
 from .identify import BETTER, Combination
+from .rubber import PERCENT
 
 TOLD = 0.999
 _RIG, _FIT, _DRAWING = (
@@ -54,9 +55,9 @@ def page(found: Fitted) -> str:
     whole = report(found)
     first, *others = whole.sections
     curves = Section("Curves and residuals", [], [], [], 0, [], [*_curves(found)])
-    return pages.page(
-        replace(whole, sections=[first, curves, *others]), found.rig.case, found.moves
-    )
+    moves = {} if found.rig.move is PERCENT else found.moves
+    whole = replace(whole, sections=[first, curves, *others])
+    return pages.page(whole, found.rig.case, moves)
 
 
 def _verdict(found: Fitted) -> Section:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -128,7 +128,27 @@ def read_goals(
     return case, goals, notes
 
 
-def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, Box]:
+@dataclass(frozen=True)
+class Movable:
+    """What may move: its rows by all their names, and the units of its boxes.
+
+    Attributes:
+        bare: unit of a box without one.
+    """
+
+    rows: Mapping[str, str]
+    units: Mapping[str, Unit]
+    bare: str
+
+
+def points_of(case: Case) -> Movable:
+    """Return the points of a table that something follows."""
+    moving = [each for each in case.hardpoints if each.moves]
+    rows = {role: each.name for each in moving for role in each.roles}
+    return Movable(rows | {each.name: each.name for each in moving}, LENGTHS, case.length_unit)
+
+
+def read_moves(texts: Sequence[str], movable: Movable, usual: str = "") -> dict[str, Box]:
     """Return the box of each place to move.
 
     Args:
@@ -137,9 +157,6 @@ def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, B
     Raises:
         KincheckError: a move has another form, there is no such row, or it is given twice.
     """
-    rows = {role: each.name for each in case.hardpoints for role in each.roles}
-    rows |= {each.name: each.name for each in case.hardpoints}
-    moving = {each.name for each in case.hardpoints if each.moves}
     found = dict[str, Box]()
     for text in texts:
         read = _MOVE.fullmatch(text)
@@ -148,38 +165,36 @@ def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, B
                 f"move {text!r}: expected points, axes and a box; say {MOVE}, such as"
                 ' "tierod_inner: y z +- 15 mm"'
             )
-        box = read_box(read["box"] or usual, f"move {text!r}", case)
+        box = read_box(read["box"] or usual, f"move {text!r}", movable)
         for name in re.split(r"\s*,\s*", read["points"]):
-            if name not in rows:
-                raise KincheckError(f"move {text!r}: {unknown('point', name, rows)}")
-            if rows[name] not in moving:
-                raise KincheckError(
-                    f"move {text!r}: nothing of the suspension follows {name}; leave it out"
-                )
+            if name not in movable.rows:
+                raise KincheckError(f"move {text!r}: {unknown('point', name, movable.rows)}")
             for axis in re.findall("[xyz]", read["axes"] or "xyz"):
-                if (place := f"{rows[name]} {axis}") in found:
+                if (place := f"{movable.rows[name]} {axis}") in found:
                     raise KincheckError(f"move {text!r}: {place} is given twice; leave one out")
                 found[place] = box
     return found
 
 
-def read_box(text: str, what: str, case: Case) -> Box:
+def read_box(text: str, what: str, movable: Movable) -> Box:
     """Return a box: "+- 15 mm", or "+5 -10 mm".
 
     Raises:
-        KincheckError: it is no positive length.
+        KincheckError: it is no positive number with a unit.
     """
     found, low, high = _BOX.fullmatch(text.strip()), np.nan, np.nan
     if found is not None:
         with suppress(ValueError):
-            lower, unit = measure(found["both"] or found["low"] or "", LENGTHS, case.length_unit)
-            bare = unit or case.length_unit
-            low = -lower
-            high = lower if found["high"] is None else LENGTHS[bare](float(found["high"]))
+            both = found["both"] or found["low"] or ""
+            lower, unit = measure(both, movable.units, movable.bare)
+            low, high = -lower, lower
+            if found["high"] is not None:
+                high = movable.units[unit or movable.bare](float(found["high"]))
     if not (-np.inf < low <= 0.0 <= high < np.inf and low < high):
         raise KincheckError(
-            f"{what}: found the box {text!r}, expected a positive length with a unit; say +- 15"
-            f" {case.length_unit}, or +5 -10 {case.length_unit}"
+            f"{what}: found the box {text!r}, expected a positive number of"
+            f" {' or '.join([*movable.units][:3])}; say +- 15 {movable.bare}, or +5 -10"
+            f" {movable.bare}"
         )
     return Box(low, high)
 
@@ -239,9 +254,10 @@ def unit_in_table(si: str, case: Case) -> Unit:
 
 
 def _of_table(si: str, case: Case) -> str:
-    """Return an SI unit in the units of the table; rates of change are per metre."""
+    """Return an SI unit in the units of the table; rates of change are per metre and per kN."""
     first, *per = si.split("/")
-    return "/".join([{"m": case.length_unit, "rad": case.angle_unit}.get(first, first), *per])
+    first = {"m": case.length_unit, "rad": case.angle_unit}.get(first, first)
+    return "/".join([first, *("kN" if each == "N" else each for each in per)])
 
 
 def _curve(goal: _Draft, case: Case, supplied: WheelOptions) -> tuple[Array, list[str]]:

@@ -25,15 +25,15 @@ DIGITS = 12
 """Digits of written coordinates: a thousandth of the accuracy of the bands and more."""
 
 
-def require_new(out: Path | None) -> None:
-    """Refuse an existing file, and one without the suffix of CSV.
+def require_new(out: Path | None, suffix: str = ".csv") -> None:
+    """Refuse an existing file, and one without the suffix.
 
     Raises:
         KincheckError: it is so.
     """
-    if out is not None and (out.exists() or out.suffix.lower() != ".csv"):
-        what = "the file exists and stays" if out.exists() else "is written as CSV"
-        raise KincheckError(f"--out {out}: {what}; give a new name that ends in .csv")
+    if out is not None and (out.exists() or out.suffix.lower() != suffix):
+        what = "the file exists and stays" if out.exists() else "the file is another kind"
+        raise KincheckError(f"--out {out}: {what}; give a new name that ends in {suffix}")
 
 
 def table_of(options: OfCase, registry: Registry) -> Case:

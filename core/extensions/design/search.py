@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,9 +16,10 @@ from ...case.units import LENGTHS
 from ...errors import KincheckError
 from ...mechanism.mechanism import Point
 from ...trajectory import Array
-from ..sweep.curves import curves
+from ..sweep.curves import DesignCurves, curves
 from .goals import Goal
 
+Curves: TypeAlias = Callable[..., DesignCurves]
 CLEAR = '--keep-clear "NAME: X0:X1 Y0:Y1 Z0:Z1 UNIT"'
 # Nearer to the middle of a box, over its size, a point is no better.
 _INSIDE = 1e-3
@@ -63,6 +65,7 @@ class Search:
     """Outputs of designs over their bands, by moves over their boxes, and their slopes.
 
     Attributes:
+        curves: solves designs.
         designs: number of designs solved.
         parts: what each number is of, by its text.
     """
@@ -71,6 +74,7 @@ class Search:
     goals: Sequence[Goal]
     boxes: Mapping[str, float]
     clear: Sequence[Clear] = ()
+    curves: Curves = curves
     designs: int = 0
     rows: Mapping[str, list[str]] = field(default_factory=dict[str, list[str]])
 
@@ -92,7 +96,7 @@ class Search:
         """Return numbers and slopes as `least_move` asks for them."""
         self.designs += 1
         names = [*self.names, *(each for row in self.rows.values() for each in row)]
-        found = curves(self.case, self.places, (u * self.box)[None], names, names)
+        found = self.curves(self.case, self.places, (u * self.box)[None], names, names)
         g = [(found.values[x.output][0, x.at] - x.middle) / x.tolerance for x in self.goals]
         by = [found.slopes[x.output][0, x.at] * self.box / x.tolerance for x in self.goals]
         for each in self.clear:
@@ -115,7 +119,7 @@ class Search:
         Raises:
             KincheckError: a sample is not reached, or a goal's output has no value there.
         """
-        found = curves(self.case, self.places, (u * self.box)[None], self.names)
+        found = self.curves(self.case, self.places, (u * self.box)[None], self.names)
         if not found.solved.all():
             raise KincheckError(
                 f"{self.case.name}: the table does not reach its whole travel"

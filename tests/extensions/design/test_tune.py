@@ -247,8 +247,8 @@ def test_tune_follows_measured_curve(car):
         ("toe = 0 +- 1 deg", "tierod_iner: y +- 1 mm", "did you mean 'tierod_inner'?"),
         ("toe = 0 +- 1 deg", "tierod_inner: y", "expected points, axes and a box"),
         ("toe = 0 +- 1 deg", "tierod_inner: y y +- 1 mm", "is given twice"),
-        ("toe = 0 +- 1 deg", "tierod_inner: y +- 1 deg", "expected a positive length"),
-        ("toe = 0 +- 1 deg", "tierod_inner: y +5 mm", "expected a positive length"),
+        ("toe = 0 +- 1 deg", "tierod_inner: y +- 1 deg", "expected a positive number of m"),
+        ("toe = 0 +- 1 deg", "tierod_inner: y +5 mm", "expected a positive number of m"),
     ],
 )
 def test_tune_bad_text_is_refused(car, capsys, goal, move, message):
