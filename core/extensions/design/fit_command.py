@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any, TextIO, cast
-
-import numpy as np
 
 from ...case.io.reader_options import CurveOptions
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
 from ...errors import refuse
 from ...options import destination, group, json_file, option, options, with_values
-from .new_table import NewTable, require_new, table_of
 
 DRAWING, RATE = "+- 2 mm", "+- 30 %"
 
@@ -75,6 +74,7 @@ class Fit(OfCase):
                 travel of the rig.
         """
         from .fit import fit
+        from .new_table import table_of
 
         supplied = replace(self.supplied, bushings=self.bushings)
         case = table_of(with_values(self, supplied=supplied), registry)
@@ -88,6 +88,7 @@ class Fit(OfCase):
         from ...report.terminal import with_json
         from .fit import Verdict
         from .fit_views import page, report
+        from .new_table import NewTable, require_new
         from .rubber import new_bushings
 
         require_new(self.out, ".toml" if self.bushings else ".csv")
@@ -123,7 +124,7 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
 
     def shifted(each: Shift) -> dict[str, Any]:
         about = {"name": each.name, "unit": each.si, "p": each.chance}
-        return about | (interval(each.size, each.deviation) if np.isfinite(each.deviation) else {})
+        return about | (interval(each.size, each.deviation) if isfinite(each.deviation) else {})
 
     rig, deviations = found.rig, found.deviations
     return {
@@ -134,7 +135,7 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
         "misfit": found.first.misfit,
         "numbers": rig.count,
         "noise": {
-            goal.output: {"deviation": float(np.median(noise)), "source": what}
+            goal.output: {"deviation": median(noise), "source": what}
             for goal, noise, what in zip(rig.goals, rig.noise, rig.sources, strict=True)
         },
         "directions": [
@@ -187,4 +188,4 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
 
 def _plain(values: Array) -> list[float | None]:
     """Return numbers, None for unknown ones."""
-    return [x if np.isfinite(x) else None for x in values.tolist()]
+    return [x if isfinite(x) else None for x in values.tolist()]
