@@ -96,7 +96,6 @@ APART = Apart(
         ),
         "TransformAxis": ("<coordinates>", "<axis>"),
     },
-    components=("<PhysicalOffsetFrame>",),
     extended=("Model",),
 )
 """Names of OpenSim without meaning for kinematics."""
@@ -219,8 +218,8 @@ class _Reader:
         tree.gravity = x, y, z
         for section in self.model.children:
             if section.tag.endswith("Set") and section.tag not in _TIED:
-                for each in section.take().children:
-                    for other in each.take().children:
+                for each in section.take().findall("objects", "groups", "defaults"):
+                    for other in each.children:
                         tree.leave(other, other.tag)
             if section.tag == "components":
                 for other in section.take().children:
@@ -566,11 +565,10 @@ def _prescribed(coordinate: Element) -> Element | None:
     Raises:
         CaseError: it has several.
     """
-    around = coordinate.child("prescribed_function")
-    if around is None:
+    if not _flag(coordinate, "prescribed"):
         return None
-    if not _flag(coordinate, "prescribed") or not around.children:
-        around.leave()
+    around = coordinate.child("prescribed_function")
+    if around is None or not around.children:
         return None
     if len(around.children) > 1:
         raise around.fault("found several functions, expected one; remove the others")
