@@ -283,9 +283,11 @@ def _others(file: Path) -> list[str]:
     robots = [Path(name).stem for name in names if name.endswith(file.suffix)]
 
     def is_own(name: str) -> bool:
-        return (
-            max((x for x in robots if name.startswith(x)), key=len, default=file.stem) == file.stem
-        )
+        owner = max((each for each in robots if name.startswith(each)), key=len, default=file.stem)
+        if owner != file.stem:
+            return False
+        with (file.parent / name).open("rb") as data:  # what kincheck writes begins with its schema
+            return b"kincheck-" not in data.read(200)
 
     return sorted(name for name in names if other.fullmatch(name) and is_own(name))
 
