@@ -99,6 +99,10 @@ APART = Apart(
     extended=("Model",),
 )
 """Names of OpenSim without meaning for kinematics."""
+EXPRESSION = "ExpressionBasedPointToPointForce"
+_NUMBER = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)"
+# A spring and a damper, as kincheck writes them.
+_LINE = re.compile(rf"{_NUMBER}\*\(d-{_NUMBER}\)\+{_NUMBER}\*ddot")
 _NAMED = re.compile(r"\w*(?:Joint|Constraint|Body|Force|Spring|Actuator|Damper)")
 _INSIDE = ("objects", "components", "frames", "coordinates", "Model")
 _TIED = (*words("BodySet JointSet ConstraintSet ForceSet MarkerSet CoordinateSet FrameSet"),)
@@ -507,6 +511,12 @@ class _Reader:
                 self._add_bushing(each)
             elif each.tag == "PointToPointSpring":
                 self._add_spring(each)
+            elif each.tag == EXPRESSION and (
+                found := _LINE.fullmatch(each.child_text("expression"))
+            ):
+                stiffness, length, damping = map(float, found.groups())
+                ends = self._ends(each, "body{}", "point{}")
+                self._add_strut(each, *ends, Spring(stiffness, damping, length))
             else:
                 if each.tag.endswith("CoordinateActuator"):
                     tree.add_motor(each.tag, {coordinate} & self.values.keys())

@@ -202,6 +202,7 @@ def test_planted_usd_is_named(tmp_path):
         for line, always in (
             (f"float physics:{NAME} = 1", True),
             (f"float acme:{NAME} = 1", moves),
+            (f"custom float {NAME} = 1", moves),
             (f"float2 physics:{NAME} = (1, 2)", True),
             (f'token[] acme:{NAME} = ["a"]', moves),
             (f'def Physics{NAME} "p" {{}}', True),
