@@ -1,6 +1,7 @@
 """kincheck same: files of one mechanism in several formats, and planted differences by hand."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -275,6 +276,11 @@ def test_spring_of_slide_is_same_between_points(form, tmp_path):
     """Formats have it between two points, or an export writes it so."""
     first = write(tmp_path, SLIDE, "first.xml")
     texts = written(load(first, driven("ja:0:0.1:3", hold_rest=True)), writer_of(form), None)
+    if form == "osim":  # ends exchanged
+        change = {"1>": "2>", "2>": "1>"}
+        old = texts[".osim"]
+        texts = {".osim": re.sub(r"(?<=body|oint)[12]>", lambda x: change[x[0]], old)}
+        assert texts[".osim"] != old
     files = [write(tmp_path, text, f"second{ending}") for ending, text in texts.items()]
     second = undriven_file(next(file for file in files if file.suffix != ".json"))
     found = compare(undriven_file(first), second, {})
