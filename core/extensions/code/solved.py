@@ -112,10 +112,21 @@ class SolvedCase:
     """Slots of origin [m] and Euler parameters, by body."""
     others: Sequence[Model]
     """Models with other choices of the independent rows, where one does not hold over the sweep."""
+    is_steered: bool
+    """Whether each driver can be moved to a value of its own."""
 
     @property
     def size(self) -> int:
-        """Numbers of a lane: the slots, the time, and the kept numbers of outputs."""
+        """Numbers of a lane: the slots, the time, the kept numbers of outputs, and the straight
+        way of the drivers.
+        """
+        return self.steered + (1 + 2 * len(self.drives()) if self.is_steered else 0)
+
+    @property
+    def steered(self) -> int:
+        """The number of a lane that tells whether the drivers go a straight way; where it begins,
+        and the change, follow by driver.
+        """
         kept = [each.kept + (4 if each.completion else 1) for each in self.outputs if each.kept]
         return max([self.at + 2, *kept])
 
@@ -211,6 +222,8 @@ class SolvedCase:
             "CONSISTENT": CONSISTENT,
             "NEAR": NEAR,
             "BETTER": BETTER,
+            "STEERED": self.steered,
+            "DRIVERS": len(self.drives()),
             "OUTPUTS": len(self.outputs),
             "PARAMETERS": len(self.parameters),
             "DESIGN": 0.0 if sweep.driver == SWEPT_TIME else sweep.design,
@@ -220,25 +233,39 @@ class SolvedCase:
     @property
     def driver_unit(self) -> str:
         """Unit of the driver's value."""
-        driver = self.case.sweep.driver
+        return self.unit(self.case.sweep.driver)
+
+    def unit(self, driver: str) -> str:
+        """Return the unit of a driver, or of time."""
         if driver == SWEPT_TIME:
             return "s"
         return "rad" if self.case.mechanism.driver(driver).turns else "m"
+
+    @property
+    def drivers(self) -> list[str]:
+        """Names of the moving drivers, in the case's order."""
+        moving = self.case.sweep.path.motions
+        return [each.name for each in self.case.mechanism.drivers if each.name in moving]
 
     def drives(self) -> list[tuple[Sequence[int], Motion, float]]:
         """Return for each moving driver its five slots, its motion from the design, and the factor
         from SI to the unit of the slots.
         """
-        found: list[tuple[Sequence[int], Motion, float]] = []
-        for name, motion in self.case.sweep.path.motions.items():
-            turns = self.case.mechanism.driver(name).turns
-            factor = 1.0 if turns else 1.0 / self.model.frame.unit
-            found.append((self.model.vectors[f"drive {name}"], motion, factor))
-        return found
+        motions, length = self.case.sweep.path.motions, 1.0 / self.model.frame.unit
+        return [
+            (self.model.vectors[f"drive {name}"], motions[name], factor)
+            for name in self.drivers
+            for factor in [1.0 if self.unit(name) == "rad" else length]
+        ]
 
 
 def solved_case(
-    case: Case, places: Sequence[str], bodies: Sequence[str] = (), *, forces: bool = False
+    case: Case,
+    places: Sequence[str],
+    bodies: Sequence[str] = (),
+    *,
+    forces: bool = False,
+    steered: bool = False,
 ) -> SolvedCase:
     """Return a case ready to be written as code.
 
@@ -246,10 +273,17 @@ def solved_case(
         places: names of the parameters, see `kincheck.curves`.
         bodies: names of those whose poses are wanted.
         forces: whether the code has the outputs of forces.
+        steered: whether each driver can be moved to a value of its own, as it can if there are
+            several.
 
     Raises:
         KincheckError: the case has a part that the code cannot have, or a place is unknown.
     """
+    names = [each.name for each in case.mechanism.drivers]
+    if steered := steered or len(names) > 1:
+        held = {name: Ramp(0.0) for name in names if name not in case.sweep.path.motions}
+        motions = {**case.sweep.motions, **held}
+        case = replace(case, sweep=replace(case.sweep, motions=motions))
     path = case.sweep.path
     for name, motion in path.motions.items():
         plain = motion.motion if isinstance(motion, Absolute) else motion
@@ -299,7 +333,8 @@ def solved_case(
         recent_model(model.mechanism, replace(model.request, rows=rows))
         for rows in _other_rows(case, model)
     ]
-    return SolvedCase(case, model, outputs, parameters, route.begin.time, poses, others)
+    begin = route.begin.time
+    return SolvedCase(case, model, outputs, parameters, begin, poses, others, steered)
 
 
 def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:

@@ -44,8 +44,9 @@ def library(folder, name, *flags, compiler="gcc"):
     command = [compiler, *STRICT, *flags, "-o", str(file), f"{name}.c", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
     found = ctypes.CDLL(str(file))
-    for function in ("output", "parameter"):
-        getattr(found, f"{name}_{function}").restype = ctypes.c_char_p
+    for function in ("output", "parameter", "driver"):
+        if hasattr(found, f"{name}_{function}"):
+            getattr(found, f"{name}_{function}").restype = ctypes.c_char_p
     getattr(found, f"{name}_size").restype = ctypes.c_size_t
     getattr(found, f"{name}_nominal").restype = ctypes.c_double
     number, state = ctypes.c_double, ctypes.c_void_p
@@ -163,6 +164,36 @@ console.log(JSON.stringify(found));
     found = np.empty((len(rows), rows.shape[1] // 3, 3))
     found[[k for k in way(case) if k is not None]] = rows.reshape(len(rows), -1, 3)
     return found
+
+
+@compiled
+@pytest.mark.parametrize("name", ["five_bar", "mcpherson_steered"])
+def test_drivers_move_to_values_of_their_own(name, tmp_path):
+    """Straight from one value to another that is far, back and forth, then along the sweep."""
+    case = kincheck.load(name)
+    write(tmp_path, c.files(case, ()))
+    call = library(tmp_path, name, "-O1")
+    names = [each.name for each in case.mechanism.drivers]
+    assert [call("driver", k).decode().split()[0] for k in range(call("drivers"))] == names
+    path, expected = case.sweep.path, truth(case)
+    velocities = path.drive(names, path.times)[1]
+    moved = np.array([case.sweep.moved.get(each, 0.0 * path.times) for each in names])
+    count = len(names)
+    state = (ctypes.c_double * (call("size") // 8))()
+    out = (ctypes.c_double * (3 * call("outputs")))()
+    call("start", state)
+    for k in (2, -3, 5, 0, 1):
+        given = [(ctypes.c_double * count)(*each[:, k]) for each in (moved, velocities)]
+        assert call("move_all", state, *given, out) == 0
+        found = np.frombuffer(out).reshape(-1, 3)
+        assert_equal(found[:, :2], expected[k][:, :2])
+    given[0][1] = float("nan")
+    before = bytes(state)
+    assert call("move_all", state, *given, out) == 1
+    assert bytes(state) == before
+    k = next(each for each in way(case) if each is not None)
+    assert call("move", state, float(case.sweep.values[k]), float(case.sweep.rate), out) == 0
+    assert_equal(np.frombuffer(out).reshape(-1, 3), expected[k])
 
 
 @node
