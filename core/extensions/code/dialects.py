@@ -106,7 +106,10 @@ ANSWER settle(LANE s) {
   for (COUNT k = 0; k < MOST; k++) {
     newton(s);
     if (!(s[RESIDUAL] < INFINITY)) return 0;
-    if (s[RESIDUAL] < TOLERANCE) return 1;
+    if (s[RESIDUAL] < TOLERANCE) {
+      newton(s); /* near a singular pose its last digits count */
+      return s[RESIDUAL] < TOLERANCE ? 1 : 0;
+    }
   }
   return 0;
 }

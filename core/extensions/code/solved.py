@@ -43,7 +43,7 @@ from ...kinematics.compiled.request import (
 from ...kinematics.continuation.segments import BETTER, NEAR, Followed
 from ...kinematics.continuation.walk import follow_samples
 from ...kinematics.formulation.acceptance_criteria import LOW
-from ...mechanism.motions import Absolute, Motion, Ramp, Sine, Table
+from ...mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
 from ...program import DONE, MARGIN, Program, Tape, program, where_larger
 from ...trajectory import QUANTITIES
 from ..sweep.curves import moved_by
@@ -265,7 +265,7 @@ def solved_case(
     bodies: Sequence[str] = (),
     *,
     forces: bool = False,
-    steered: bool = False,
+    steered: Sequence[Path] = (),
 ) -> SolvedCase:
     """Return a case ready to be written as code.
 
@@ -273,14 +273,14 @@ def solved_case(
         places: names of the parameters, see `kincheck.curves`.
         bodies: names of those whose poses are wanted.
         forces: whether the code has the outputs of forces.
-        steered: whether each driver can be moved to a value of its own, as it can if there are
-            several.
+        steered: further paths, of all drivers, on which redundant rows are exchanged. With them,
+            or with several drivers, each driver can be moved to a value of its own.
 
     Raises:
         KincheckError: the case has a part that the code cannot have, or a place is unknown.
     """
     names = [each.name for each in case.mechanism.drivers]
-    if steered := steered or len(names) > 1:
+    if is_steered := bool(steered) or len(names) > 1:
         held = {name: Ramp(0.0) for name in names if name not in case.sweep.path.motions}
         motions = {**case.sweep.motions, **held}
         case = replace(case, sweep=replace(case.sweep, motions=motions))
@@ -331,10 +331,10 @@ def solved_case(
     }
     others = [
         recent_model(model.mechanism, replace(model.request, rows=rows))
-        for rows in _other_rows(case, model)
+        for rows in _other_rows(case, model, [path, *steered])
     ]
     begin = route.begin.time
-    return SolvedCase(case, model, outputs, parameters, begin, poses, others, steered)
+    return SolvedCase(case, model, outputs, parameters, begin, poses, others, is_steered)
 
 
 def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:
@@ -349,20 +349,11 @@ def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:
             f"{case.name}: the forces of this mechanism are none that code can have. Leave --forces"
             " out."
         )
-    if model.selection.dropped:
-        solver = NativeSolver()
-        found = solver.prepare(case.mechanism, case.sweep.path, case.points, (), case.forces)(TOL)
-        loose = [
-            each.name
-            for each in case.outputs
-            if each.forces
-            and np.isnan(output_series(case, each, found).position[found.solved]).any()
-        ]
-        if loose:
-            raise KincheckError(
-                f"{case.name}: redundant rows leave {shortened(loose, 5)} undetermined, as"
-                " kincheck run tells. Leave these outputs out, or --forces."
-            )
+    if model.selection.dropped and (loose := loose_forces(case)):
+        raise KincheckError(
+            f"{case.name}: redundant rows leave {shortened(loose, 5)} undetermined, as kincheck"
+            " run tells. Leave these outputs out, or --forces."
+        )
     names = [f"{REACTION}{each}" for each in wanted.joints]
     names += [f"{EFFORT}{each}" for each in wanted.drivers]
     names += [f"{ELEMENT}{each}" for each in wanted.elements]
@@ -388,15 +379,27 @@ def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:
     }
 
 
-def _other_rows(case: Case, model: Model) -> list[tuple[int, ...]]:
-    """Return the further choices of independent rows that native takes over the sweep."""
+def loose_forces(case: Case) -> list[str]:
+    """Return the names of the outputs of forces that are undetermined somewhere on the sweep."""
+    solver = NativeSolver()
+    found = solver.prepare(case.mechanism, case.sweep.path, case.points, (), case.forces)(TOL)
+    forces = [each for each in case.outputs if each.forces]
+    values = {each.name: output_series(case, each, found).position for each in forces}
+    return [name for name, each in values.items() if np.isnan(each[found.solved]).any()]
+
+
+def _other_rows(case: Case, model: Model, paths: Sequence[Path]) -> list[tuple[int, ...]]:
+    """Return the further choices of independent rows that native takes on paths."""
     if not model.selection.dropped:
         return []
-    route = DesignOutputs.of(case, (), derivative=2).designs.route
-    followed = Followed(route, follow_samples(route, TOL, low=LOW), TOL)
-    followed.go_on()
-    followed.renew(followed.visit(np.flatnonzero(followed.needs_check).tolist()))
-    return [each.selection.chosen for each in followed.models[1:]]
+    made, found = DesignOutputs.of(case, (), derivative=2), dict[tuple[int, ...], None]()
+    for path in paths:
+        route = made.on_path(path).designs.route
+        followed = Followed(route, follow_samples(route, TOL, low=LOW), TOL)
+        followed.go_on()
+        followed.renew(followed.visit(np.flatnonzero(followed.needs_check).tolist()))
+        found |= dict.fromkeys(each.selection.chosen for each in followed.models[1:])
+    return [*found]
 
 
 def _nominal(geometry: Geometry, name: str) -> float:
