@@ -5,10 +5,9 @@
 const WAY = 32; // parts of the way from the design to a pose, as the server's
 
 function answererOf(hear) {
-  const { opening, answer, reaches, outputs, reactions, poses, csv } = SAVED;
+  const { opening, answer, reaches, outputs, reactions, poses, csv, slow } = SAVED;
   const mechanism = new solver.Mechanism();
   const out = new Float64Array(3 * mechanism.outputs());
-  const still = opening.drivers.map(() => 0);
   const known = (which) => (Number.isFinite(out[3 * which]) ? out[3 * which] : null);
 
   // Move straight from the design, up to the last part of the way that is reached.
@@ -17,12 +16,14 @@ function answererOf(hear) {
     const design = opening.drivers.map((driver) => driver.design);
     const change = opening.drivers.map(({ name }, k) => (drivers[name] ?? design[k]) - design[k]);
     const at = (share) => design.map((value, k) => value + share * change[k]);
+    // forces are those at rest; what is per travel is along the way
+    const rates = change.map((by) => by / slow);
     mechanism.start();
-    if (mechanism.moveAll(design, still, out)) {
+    if (mechanism.moveAll(design, rates, out)) {
       return { type: "invalid", message: "the design position is not reached" };
     }
     let part = 0;
-    while (part < WAY && !mechanism.moveAll(at((part + 1) / WAY), still, out)) part += 1;
+    while (part < WAY && !mechanism.moveAll(at((part + 1) / WAY), rates, out)) part += 1;
     const lane = mechanism.lanes[0];
     const reached = at(part / WAY);
     return {

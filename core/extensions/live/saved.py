@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, cast
 import msgspec
 import numpy as np
 
-from ...case.case import HELD_BUT, TIME, Case, Sweep, without_forces
+from ...case.case import HELD_BUT, SLOW, TIME, Case, Sweep, without_forces
 from ...case.measures import JointForce
 from ...errors import KincheckError
 from ...harness.labels import in_table_units
@@ -125,6 +125,7 @@ def _model(live: LiveModel) -> tuple[dict[str, Any], SolvedCase]:
         "outputs": [(name, k) for name, k in numbers.items() if name in own],
         "reactions": [each for each in reactions.items() if max(each[1]) >= 0],
         "poses": [*solved.poses.items()],
+        "slow": SLOW,
         "csv": {"name": name, "content": file_of(curves, live.case, name)},
     }
     return saved, solved
