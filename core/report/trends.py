@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..harness.labels import motion_unit, product
+from ..harness.labels import displayed, motion_unit, product
 from ..history.queries import Entry, History, unit_of
 from ..history.steps import steps
 from ..history.store import RunRow
@@ -58,12 +58,16 @@ def run_name(row: RunRow) -> str:
 
 
 def largest_errors(entry: Entry, row: RunRow) -> dict[str, float]:
-    """Return the largest errors of the outputs by unit: of values, velocities and accelerations."""
+    """Return the largest errors of the outputs by unit, that of the case's file: of values,
+    velocities and accelerations.
+    """
     found: dict[str, float] = {}
+    facts = row.circumstances.get("cases", {}).get(entry.case, {})
     for name, deviations in entry.errors.items():
         for quantity, deviation in deviations.items():
-            unit = motion_unit(unit_of(row, entry.case, name), quantity) or "1"
-            found[unit] = max(found.get(unit, 0.0), deviation.max_abs)
+            si = motion_unit(unit_of(row, entry.case, name), quantity)
+            unit, factor = displayed(si, facts) if si else ("1", 1.0)
+            found[unit] = max(found.get(unit, 0.0), factor * deviation.max_abs)
     return found
 
 
