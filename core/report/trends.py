@@ -57,12 +57,12 @@ def run_name(row: RunRow) -> str:
     return f"{row.started[:16].replace('T', ' ')} #{row.id}"
 
 
-def largest_errors(entry: Entry, row: RunRow) -> dict[str, float]:
-    """Return the largest errors of the outputs by unit, that of the case's file: of values,
-    velocities and accelerations.
+def largest_errors(entry: Entry, row: RunRow, newest: RunRow) -> dict[str, float]:
+    """Return the largest errors of the outputs by unit, that of the case's file in the newest run:
+    of values, velocities and accelerations.
     """
     found: dict[str, float] = {}
-    facts = row.circumstances.get("cases", {}).get(entry.case, {})
+    facts = newest.circumstances.get("cases", {}).get(entry.case, {})
     for name, deviations in entry.errors.items():
         for quantity, deviation in deviations.items():
             si = motion_unit(unit_of(row, entry.case, name), quantity)
