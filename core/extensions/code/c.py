@@ -170,7 +170,7 @@ def header(solved: SolvedCase, name: str) -> str:
         source=source,
         guard=f"{name.upper()}_H",
         driver=sweep.driver,
-        unit=solved.driver_unit,
+        unit=solved.unit(sweep.driver),
         others=others if solved.is_steered and sweep.driver != TIME else "",
         steer=STEER_HEADER.format(n=name) if solved.is_steered else "",
     )

@@ -230,11 +230,6 @@ class SolvedCase:
             "PACE": 1.0 if sweep.driver == SWEPT_TIME else sweep.pace,
         }
 
-    @property
-    def driver_unit(self) -> str:
-        """Unit of the driver's value."""
-        return self.unit(self.case.sweep.driver)
-
     def unit(self, driver: str) -> str:
         """Return the unit of a driver, or of time."""
         if driver == SWEPT_TIME:

@@ -14,7 +14,7 @@ import pytest
 from kincheck import cases
 from kincheck.core import KincheckError
 from kincheck.core.cli.main import main
-from kincheck.core.extensions.code import c, js
+from kincheck.core.extensions.code import c, fmu, js
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from scipy.interpolate import CubicSpline
 
@@ -337,6 +337,28 @@ def test_fmu_passes_as_engine(version, tmp_path, monkeypatch, capsys):
     errors = record["errors"]["half_track_change"]
     assert max(errors[motion]["max_abs"] for motion in MOTIONS) < CLOSE
     capsys.readouterr()
+
+
+@compiled
+@pytest.mark.skipif(importlib.util.find_spec("fmpy") is None, reason="no FMPy")
+@pytest.mark.parametrize("version", [pytest.param(2, marks=pytest.mark.nightly), 3])
+def test_fmu_has_drivers_that_hold_as_inputs(version, tmp_path):
+    fmpy, case = importlib.import_module("fmpy"), kincheck.load("five_bar")
+    k, expected = 3, truth(case)
+    held = replace(case, sweep=replace(case.sweep, motions={}), reference={})
+    write(tmp_path, fmu.files(held, ["joints.left_pivot.point x"], version))
+    file = str(tmp_path / "five_bar.fmu")
+    assert importlib.import_module("fmpy.validation").validate_fmu(file) == []
+    given = {name: float(values[k]) for name, values in case.sweep.moved.items()}
+    velocities = case.sweep.path.drive(list(given), case.sweep.path.times)[1][:, k]
+    given |= {f"{name}.velocity": float(v) for name, v in zip(given, velocities, strict=True)}
+    names = [each.name for each in case.outputs]
+    found = fmpy.simulate_fmu(file, start_values=given, stop_time=0.1, output=names)[0]
+    assert_equal(np.array([found[name] for name in names]), expected[k, :, 0])
+    found = fmpy.simulate_fmu(
+        file, start_values=given, stop_time=0.1, output=[f"{each}.velocity" for each in names]
+    )[0]
+    assert_equal(np.array([found[f"{name}.velocity"] for name in names]), expected[k, :, 1])
 
 
 @pytest.mark.parametrize(
