@@ -2,7 +2,7 @@
 
 Files have six to nine digits, keyframes fewer, and polynomial couplings may have offsets: the start
 is open. Coordinates move by the shortest way until it is closed; far away by damped steps, as in
-`kinematics.assembly`, near by Newton's, without directions weak within the digits. A `Mechanism` is
+`assemblies.assemble`, near by Newton's, without directions weak within the digits. A `Mechanism` is
 no help before that: its joints coincide at design, and its rows hold to round-off.
 """
 
@@ -25,7 +25,7 @@ from .tree import UNKNOWNS, Closure, Coupling, Move, Strut, Tie, Tree
 
 MAX_ITERATIONS = 100
 # Below this residual, or that of the file's digits, Newton's steps end the assembly: damped ones
-# would follow the digits along weak directions. Damping as in kinematics.assembly.
+# would follow the digits along weak directions. Damping as in assemblies.assemble.
 NEAR, DAMPING = 1e-6, 0.1
 # A gap of this part of the model's size is no rounding, and its assembly may be another one than
 # meant.
