@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from ..case.case import Truth
-from ..harness.engine import STANDARD
+from ..harness.engine import RECORDED, STANDARD
 from ..harness.labels import (
     against,
     displayed,
@@ -179,7 +179,11 @@ class Material:
         """The styles of the engines, those without any record last."""
         never = sorted({product(engine, mode) for _, engine, mode in self.results.missing})
         names = dict.fromkeys([*map(engine_name, self.results.records), *never])
-        return {name: Style.number(index, name) for index, name in enumerate(names)}
+        recorded = {engine_name(each) for each in self.results.records if each.mode == RECORDED}
+        return {
+            name: Style.number(index, name, measured=name in recorded)
+            for index, name in enumerate(names)
+        }
 
 
 def case_view(given: Material, name: str, anchor: str) -> CaseView:
@@ -257,7 +261,8 @@ def _output(
     positions = [each for each in deviations if each.motion == "position"]
     standard = _standard(positions, records, references)
     band = (standard, positions[0].deviation.tolerance) if standard else None
-    given.figures[key] = output_figure(output, axis, curves, truth, band)
+    points = records[0].truth == Truth.THIRD_PARTY_DATA
+    given.figures[key] = output_figure(output, axis, curves, truth, band, measured=points)
     sentences = [
         f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)
     ]

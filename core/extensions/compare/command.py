@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...case.io.reader_options import Supplied
-from ...cli.parser import Command
+from ...cli.forms import contents_of_forms, with_forms
 from ...cli.registry import Registry, Status, tell_left_out
 from ...cli.shared_options import TOL
 from ...errors import KincheckError, collect_errors, refuse
@@ -28,11 +28,12 @@ if TYPE_CHECKING:
 
 PAGE = ("compare.json", "compare.html")
 """File names in the folder of --out."""
+_Formed: Any = with_forms()
 WIDE = "write a column for each output, design and difference"
 
 
 @options
-class Compare(Command):
+class Compare(_Formed):  # pyright: ignore[reportUntypedBaseClass]
     """Compare designs of a suspension: which hardpoints differ, and by how much toe, camber, roll
     centre and the other outputs do, at rebound, design, jounce and where they differ most.
 
@@ -108,14 +109,18 @@ class Compare(Command):
         columns = views.side_by_side(designs)
         rows = [*zip(*columns.values(), strict=True)]
         kinds = dict.fromkeys(columns, Kind.NUMBER)
+        report = views.comparison(designs, beyond)
         deliver(
-            views.comparison(designs, beyond),
+            report,
             views.with_comparison(designs, beyond),
             out=self.out,
             json=self.json,
             files=[
-                (file, lambda path, kind=kind: WRITERS[kind](path, kinds, [rows]))
-                for kind, file in curves_of(self).items()
+                *(
+                    (file, lambda path, kind=kind: WRITERS[kind](path, kinds, [rows]))
+                    for kind, file in curves_of(self).items()
+                ),
+                *contents_of_forms(self, report),
             ],
             problems=unsolved,
         )

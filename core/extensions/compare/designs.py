@@ -189,7 +189,23 @@ def comparison(designs: Designs, beyond: Sequence[str]) -> Report:
     first, *others = (case.name for case in designs.cases)
     signs = dict.fromkeys(case.signs for case in designs.cases if case.signs)
     sections = [_of_outputs(designs, beyond), _of_points(designs.cases), _of_curves(designs)]
-    return Report("compare", f"{', '.join(others)} against {first}", [*signs], sections)
+    name = f"{', '.join(others)} against {first}"
+    return Report("compare", name, [*signs], sections, verdict=_verdict(designs, beyond))
+
+
+def _verdict(designs: Designs, beyond: Sequence[str]) -> str:
+    """Return the first difference beyond what the user accepts, or of the first output that
+    differs.
+    """
+    if beyond:
+        return " ".join(
+            [beyond[0], f"{len(beyond) - 1} more differ too much."] if beyond[1:] else beyond
+        )
+    for name, label, apart, k in designs.differences():
+        if abs(apart[k]) >= ZERO:
+            largest = f"{_signed_number(apart[k])} {designs.units[name]}".rstrip()
+            return f"{name} of {label} differs by at most {largest}, at {designs.at(k)}."
+    return "no output differs."
 
 
 def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:

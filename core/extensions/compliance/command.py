@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...case.io.reader_options import Supplied
 from ...cli import shared_options
+from ...cli.forms import contents_of_forms, with_forms
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import TOL, Isolated
 from ...errors import KincheckError, labelled, refuse
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from .study import ComplianceResults
 
 MOST, UNLESS_GIVEN = 100_000, "25"
+_Formed: Any = with_forms()
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class FromDesign(Supplied):
 
 
 @options
-class MeasureCompliance(Isolated):
+class MeasureCompliance(Isolated, _Formed):  # pyright: ignore[reportUntypedBaseClass]
     """Find the equilibria of a suspension with springs, bushings and loads, and their compliance.
 
     Joints with bushings give way to them. --axle heave, roll or steer moves both wheels of an axle.
@@ -95,7 +97,7 @@ class MeasureCompliance(Isolated):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...case.io.atomic_files import write
+        from ...case.io.atomic_files import write, write_all
         from ...case.units import LENGTHS
         from ...harness.engine import STANDARD
         from ...harness.record import to_json
@@ -138,6 +140,7 @@ class MeasureCompliance(Isolated):
             if checked is not None:
                 write("--out", self.out / "results.json", to_json(checked))
             write("--out", self.out / "kc.html", views.page(results).encode())
+        problems += write_all(contents_of_forms(self, views.report(results)))
         with with_json(views.as_data(results), self.json) as console:
             print(*views.lines(results), sep="\n", file=console.file)
             if checked is not None:

@@ -15,6 +15,7 @@ from ...harness.record import Record, Results
 from ...report.axis import ZERO
 from ...report.figures import Figure, Style
 from ...report.page_model import ROUND_OFF, Plot
+from ...report.report import headline
 from ...report.sections import Diagram, Report, Section
 from ...report.sections import page as render
 from ...trajectory import Array
@@ -187,7 +188,12 @@ def _lines(curves: ComplianceCurves) -> Iterator[str]:
 
 
 def page(results: ComplianceResults) -> str:
-    """Return the page: curves over travel with the rigid ones beside, then over each load."""
+    """Return the page."""
+    return render(report(results))
+
+
+def report(results: ComplianceResults) -> Report:
+    """Return the curves over travel with the rigid ones beside, then over each load."""
     every = (results.travel, *results.loads.values())
     sections = [_section(number, curves) for number, curves in enumerate(every)]
     if results.checked is not None:
@@ -210,7 +216,18 @@ def page(results: ComplianceResults) -> str:
         "the height of the wheel's centre is held",
         "point at a figure to read its values",
     )
-    return render(Report("kc", f"Kinematics and compliance of {results.case}", facts, sections))
+    lost = sum(int((~np.isfinite(each.wheel_load)).sum()) for each in every)
+    count = sum(len(each.at) for each in every)
+    said = (
+        f"{lost} of {count} samples have no equilibrium"
+        if lost
+        else (f"all {count} samples have an equilibrium")
+    )
+    if results.checked is not None:
+        agreed = headline(results.checked)
+        said += f"; {agreed[0].lower()}{agreed[1:]}"
+    name = f"Kinematics and compliance of {results.case}"
+    return Report("kc", name, facts, sections, verdict=f"{said}.")
 
 
 def _section(number: int, curves: ComplianceCurves) -> Section:

@@ -1,0 +1,71 @@
+"""Further forms of what a command shows, such as a short paper: options that extensions add to
+run, report, and commands with a page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import make_dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from ..doors import offers
+from ..options import options
+from .parser import Command
+
+if TYPE_CHECKING:
+    from ..case.io.atomic_files import Content
+    from ..harness.record import Results
+    from ..report.sections import Report
+
+    Shown: TypeAlias = Results | Report
+    """What a command shows: the results of a run, or tables and diagrams."""
+
+
+@options
+class Form(Command):
+    """Options that an extension adds, with the files that they ask for. The functions get all
+    options of the command.
+    """
+
+    @staticmethod
+    def files_of(options: Any) -> dict[str, Path]:
+        """Return the requested files by their options, before the work starts.
+
+        Raises:
+            KincheckError: the folder of a file cannot be made.
+        """
+        return {}
+
+    @staticmethod
+    def contents(options: Any, shown: Shown, verdict: str) -> list[tuple[Path, Content]]:
+        """Return the requested files.
+
+        Args:
+            verdict: a sentence of the command, to stand before that of what is shown.
+        """
+        return []
+
+
+@cache
+def forms() -> Sequence[type[Form]]:
+    """Return the options that extensions add."""
+    return [each.load() for each in offers("forms").values()]
+
+
+def with_forms() -> Any:
+    """Return a class with all these options."""
+    return make_dataclass("Formed", (), bases=(*forms(), Command), frozen=True)
+
+
+def files_of_forms(options: Any) -> dict[str, Path]:
+    """Return the files that they ask for, by their options."""
+    asked = [form for form in forms() if isinstance(options, form)]
+    return {name: file for form in asked for name, file in form.files_of(options).items()}
+
+
+def contents_of_forms(options: Any, shown: Shown, verdict: str = "") -> list[tuple[Path, Content]]:
+    """Return the files that they ask for; see `Form.contents`."""
+    asked = [form for form in forms() if isinstance(options, form)]
+    return [each for form in asked for each in form.contents(options, shown, verdict)]
