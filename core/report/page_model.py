@@ -133,6 +133,8 @@ class CaseView:
     """One case of the page.
 
     Attributes:
+        source: the file or the origin of its numbers, and the convention of signs.
+        log: how the file was read; empty if `source` has all.
         evidence: evidence on the reference; None without a reference.
         worst: the deviation closest to its tolerance, or farthest beyond it.
         account: the degrees of freedom, as counted in the paper and by rank.
@@ -146,6 +148,7 @@ class CaseView:
     anchor: str
     truth: Truth
     source: str
+    log: str
     records: list[Record]
     evidence: Evidence | None
     axis: Axis
@@ -198,11 +201,14 @@ def case_view(given: Material, name: str, anchor: str) -> CaseView:
     for index, output in enumerate(names):
         here = [each for each in deviations if each.output == output]
         outputs.append(_output(given, output, f"{anchor}-{index}", here, records, axis))
+    source = facts.get("source", "")
+    brief, more, _ = source.partition(";")
     return CaseView(
         name=name,
         anchor=anchor,
         truth=Truth(records[0].truth),
-        source=" · ".join(filter(None, (facts.get("source", ""), facts.get("signs", "")))),
+        source=" · ".join(filter(None, (brief, facts.get("signs", "")))),
+        log=source if more else "",
         records=records,
         evidence=next((record.evidence for record in records if record.evidence), None),
         axis=axis,
