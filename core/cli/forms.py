@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..doors import offers
-from ..options import options
+from ..options import option_fields, options
 from .parser import Command
 
 if TYPE_CHECKING:
@@ -55,8 +55,9 @@ def forms() -> Sequence[type[Form]]:
 
 
 def with_forms() -> Any:
-    """Return a class with all these options."""
-    return make_dataclass("Formed", (), bases=(*forms(), Command), frozen=True)
+    """Return a class with all these options, behind the others of a command."""
+    last = {"LAST": tuple(each.name for form in forms() for each, *_ in option_fields(form))}
+    return make_dataclass("Formed", (), bases=(*forms(), Command), namespace=last, frozen=True)
 
 
 def files_of_forms(options: Any) -> dict[str, Path]:

@@ -95,7 +95,11 @@ class Run(Isolated, _Added, _Formed):  # pyright: ignore[reportUntypedBaseClass]
     """
 
     about = "solve cases with engines and judge the results"
-    LAST = (*Isolated.LAST, *(each.name for each, *_ in option_fields(_Added) if not each.init))
+    LAST = (
+        *Isolated.LAST,
+        *_Formed.LAST,
+        *(each.name for each, *_ in option_fields(_Added) if not each.init),
+    )
     cases: str | Path | Case | Sequence[str | Path | Case] | None = argument(
         CASES, "CASE", "*", default=()
     )

@@ -63,6 +63,7 @@ class MeasureCompliance(Isolated, _Formed):  # pyright: ignore[reportUntypedBase
     """
 
     about = "kinematics and compliance: equilibria on bushings over travel and loads"
+    LAST = (*Isolated.LAST, *_Formed.LAST)
     case: str = argument(
         "name of a built-in case, or path to a case file or a hardpoint table", "CASE"
     )
