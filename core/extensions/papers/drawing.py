@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any, TypeAlias
 
-from ...report.figures import Figure
+from ...report.figures import RAISED, Figure
 
 Place: TypeAlias = tuple[float, float]
 Tick: TypeAlias = tuple[Any, str]
@@ -180,7 +180,14 @@ def _log_ticks(low: float, high: float, count: int) -> list[Tick]:
     stride = max(1, math.ceil((high - low) / count))
     factors = (1, 2, 5) if 3 * (high - low) <= count + 1 else (1,)
     powers = (p for p in range(math.ceil(low) - 1, math.floor(high) + 1) if p % stride == 0)
-    return [(f * 10.0**p, _text(f * 10.0**p)) for p in powers for f in factors]
+    return [(f * 10.0**p, _power(f, p)) for p in powers for f in factors]
+
+
+def _power(factor: int, power: int) -> str:
+    raised = f"10{str(power).translate(RAISED)}"
+    return (
+        _text(factor * 10.0**power) if abs(power) < 4 else f"{factor}·{raised}".removeprefix("1·")
+    )
 
 
 def _text(value: float) -> str:
