@@ -1,6 +1,4 @@
-"""Further forms of what a command shows, such as a short paper: options that extensions add to
-run, report, and commands with a page.
-"""
+"""Further forms of a command's page, such as a short paper: options added by extensions."""
 
 from __future__ import annotations
 
@@ -12,7 +10,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..doors import offers
 from ..options import option_fields, options
-from .parser import Command
 
 if TYPE_CHECKING:
     from ..case.io.atomic_files import Content
@@ -20,14 +17,12 @@ if TYPE_CHECKING:
     from ..report.sections import Report
 
     Shown: TypeAlias = Results | Report
-    """What a command shows: the results of a run, or tables and diagrams."""
+    """Content of a page: the results of a run, or tables and diagrams."""
 
 
 @options
-class Form(Command):
-    """Options that an extension adds, with the files that they ask for. The functions get all
-    options of the command.
-    """
+class Form:
+    """Options of an extension for further files. The functions get all options of the command."""
 
     @staticmethod
     def files_of(options: Any) -> dict[str, Path]:
@@ -43,30 +38,30 @@ class Form(Command):
         """Return the requested files.
 
         Args:
-            verdict: a sentence of the command, to stand before that of what is shown.
+            verdict: a sentence of the command, before the verdict of the page.
         """
         return []
 
 
 @cache
 def forms() -> Sequence[type[Form]]:
-    """Return the options that extensions add."""
+    """Return the options of extensions."""
     return [each.load() for each in offers("forms").values()]
 
 
 def with_forms() -> Any:
     """Return a class with all these options, behind the others of a command."""
     last = {"LAST": tuple(each.name for form in forms() for each, *_ in option_fields(form))}
-    return make_dataclass("Formed", (), bases=(*forms(), Command), namespace=last, frozen=True)
+    return make_dataclass("Formed", (), bases=tuple(forms()), namespace=last, frozen=True)
 
 
 def files_of_forms(options: Any) -> dict[str, Path]:
-    """Return the files that they ask for, by their options."""
+    """Return the files requested by these options."""
     asked = [form for form in forms() if isinstance(options, form)]
     return {name: file for form in asked for name, file in form.files_of(options).items()}
 
 
 def contents_of_forms(options: Any, shown: Shown, verdict: str = "") -> list[tuple[Path, Content]]:
-    """Return the files that they ask for; see `Form.contents`."""
+    """Return the contents of these files; see `Form.contents`."""
     asked = [form for form in forms() if isinstance(options, form)]
     return [each for form in asked for each in form.contents(options, shown, verdict)]

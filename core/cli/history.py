@@ -13,6 +13,7 @@ from ..options import argument, destination, json_file, option, options, switch,
 from ..report.progress import complain
 from .forms import contents_of_forms, with_forms
 from .parser import Command
+from .parser import Command
 from .registry import Registry, Status
 from .shared_options import HISTORY
 
@@ -193,7 +194,7 @@ OUT = ("regressions.json", "regressions.md", "junit.xml", "report.html")
 
 
 @options
-class ReportChanges(_Formed):  # pyright: ignore[reportUntypedBaseClass]
+class ReportChanges(_Formed, Command):  # pyright: ignore[reportUntypedBaseClass]
     """Report the changes since another run: new failures, fixes, lost results, lower accuracy,
     longer times, changed versions, the first run of each change, and tolerances to tighten.
 

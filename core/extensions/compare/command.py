@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...case.io.reader_options import Supplied
 from ...cli.forms import contents_of_forms, with_forms
+from ...cli.parser import Command
 from ...cli.registry import Registry, Status, tell_left_out
 from ...cli.shared_options import TOL
 from ...errors import KincheckError, collect_errors, refuse
@@ -33,7 +34,7 @@ WIDE = "write a column for each output, design and difference"
 
 
 @options
-class Compare(_Formed):  # pyright: ignore[reportUntypedBaseClass]
+class Compare(_Formed, Command):  # pyright: ignore[reportUntypedBaseClass]
     """Compare designs of a suspension: which hardpoints differ, and by how much toe, camber, roll
     centre and the other outputs do, at rebound, design, jounce and where they differ most.
 

@@ -57,7 +57,7 @@ def marks_at(drawn):
     return [(float(x), float(y)) for x, y in re.findall(disc, drawn)]
 
 
-def test_summary_says_verdict_and_what_is_not_judged():
+def test_summary_says_verdict_and_gaps():
     page = summary(paper_of(measured()))
     assert re.search(
         r"<h1>1 of 2 comparisons is outside tolerance; farthest beyond its tolerance:"
@@ -74,7 +74,7 @@ def test_summary_says_verdict_and_what_is_not_judged():
     assert "<h1>run 7 against run 6: 1 new failure. 1 of 2 comparisons" in page
 
 
-def test_measured_points_are_discs_at_their_values():
+def test_measured_points_are_discs():
     """All samples of a measurement, as far apart as their values; an oracle is a line."""
     drawn = [svg(each.figure) for each in paper_of(measured()).diagrams.values()]
     places = marks_at(drawn[0].partition("</svg>")[0])
@@ -183,7 +183,7 @@ def test_compare_and_kc_become_papers(tmp_path, without_browser, capsys):
         (["--summary", "gone/x.html"], "--summary gone/x.html: cannot be written"),
     ],
 )
-def test_slips_of_files_are_found_before_the_work(tmp_path, monkeypatch, words, said, capsys):
+def test_slips_of_files_are_early(tmp_path, monkeypatch, words, said, capsys):
     monkeypatch.chdir(tmp_path)
     Path("taken").write_text("")
     assert main(["run", "rssr", "--engine", "native", *words]) == 2
