@@ -13,7 +13,6 @@ from ..options import argument, destination, json_file, option, options, switch,
 from ..report.progress import complain
 from .forms import contents_of_forms, with_forms
 from .parser import Command
-from .parser import Command
 from .registry import Registry, Status
 from .shared_options import HISTORY
 

@@ -21,6 +21,7 @@ from ..errors import UnknownNameError, number_of
 from ..tabular import Tabular
 from ..trajectory import PER_TIME, QUANTITIES
 from .scene_record import Scene
+from .table_units import driver_unit, in_table_units
 
 Facts: TypeAlias = Mapping[str, Any]
 """Circumstances of a run, or facts of a case, as `Results.run` has them."""
@@ -71,7 +72,6 @@ class RecordTable(Tabular):
 
     def drawn(self) -> Dataset:
         """Return the dataset in the units of the case's table of hardpoints, or in SI."""
-        from .labels import driver_unit, in_table_units
 
         def converted(each: Variable, unit: str) -> Variable:
             name, size = in_table_units(unit, self.table)

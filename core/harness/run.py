@@ -16,9 +16,9 @@ from ..errors import CaseError
 from .compare import as_numbers
 from .engine import STANDARD, Engine, untimed
 from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, error_text, solve_in_process
-from .labels import table_facts
 from .provenance import results, truth_of
 from .record import Deviations, Evidence, Outcome, Record, Results, Seconds
+from .table_units import table_facts
 from .verdict import (
     Standard,
     Verdict,

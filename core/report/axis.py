@@ -15,8 +15,9 @@ from rich.text import Text
 from ..case.case import PER_TRAVEL
 from ..case.io.escape import visible
 from ..errors import shortened
-from ..harness.labels import DRIVER_UNITS, displayed, driver_unit
+from ..harness.labels import displayed
 from ..harness.record import Facts, Outcome, Record, Results
+from ..harness.table_units import DRIVER_UNITS, driver_unit
 from ..unit_text import value_text, with_unit
 from . import terminal
 

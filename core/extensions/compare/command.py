@@ -176,7 +176,7 @@ def _tolerances_of(texts: Sequence[str], file: Path, designs: Designs) -> dict[s
     """Return accepted differences by output, in the units of the first design."""
     from ...case.io.document import unknown_name
     from ...case.io.reference_curve import size_of
-    from ...harness.labels import in_table_units
+    from ...harness.table_units import in_table_units
 
     units = {name: each.unit for name, each in designs.results.records[0].outputs.items()}
     found: dict[str, float] = {}

@@ -14,9 +14,10 @@ import numpy as np
 from ...case.case import MARKER, PER_TRAVEL, Case
 from ...case.units import LENGTHS
 from ...dataset import Dataset, Variable
-from ...harness.labels import in_table_units, shorten_names
 from ...harness.labels import notes as notes_of
+from ...harness.labels import shorten_names
 from ...harness.record import Facts, Results
+from ...harness.table_units import in_table_units
 from ...joints import Kind
 from ...kinematics import kinds, places
 from ...report.axis import ZERO, driver_axis, events, number

@@ -10,10 +10,9 @@ import numpy as np
 
 from ...case.case import Case, without_forces
 from ...errors import KincheckError
-from ...harness.labels import in_table_units
 from ...harness.provenance import case_facts
+from ...harness.table_units import DRIVER_UNITS, in_table_units
 from ...kinematics import places
-from ...report.axis import DRIVER_UNITS
 from ...unit_text import with_unit
 from ..code.js import source
 from ..code.solved import SolvedCase, solved_case
