@@ -1,5 +1,6 @@
 """Summaries of two pages, and figures as files."""
 
+import math
 import re
 import shutil
 from pathlib import Path
@@ -102,6 +103,9 @@ def test_values_stand_on_their_ticks(kind, values):
     assert len(shared) == len(values)
     for value in shared:
         assert heights[value] == pytest.approx(places[value], abs=0.1)
+    first, middle, last = map(math.log10 if kind == "log" else float, values)
+    share = (places[values[1]] - places[values[0]]) / (places[values[2]] - places[values[0]])
+    assert share == pytest.approx((middle - first) / (last - first), abs=1e-3)
     assert "a &lt; b" in drawn
 
 
