@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -73,24 +72,11 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
     Raises:
         CaseError: an option is not a travel.
     """
-    wheel, samples = (-TRAVEL, TRAVEL), SAMPLES
+    wheel = np.linspace(-TRAVEL, TRAVEL, SAMPLES)
     if travel is not None:
-        parts = travel.split(":")
-        count = parts.pop() if len(parts) > 1 else str(SAMPLES)
-        ends = _interval(parts)
-        with suppress(ValueError):
-            samples = int(count)
-        if ends is None or ends[0] == ends[1] or not 1 < samples <= MOST_SAMPLES:
-            raise fault(
-                file,
-                "--travel",
-                f"found {shown(travel)}, expected a length such as 50mm, or LENGTH:SAMPLES, 2 to"
-                f" {MOST_SAMPLES} of them, or START:STOP:SAMPLES, up to {FARTHEST:g} m, in metres"
-                " unless a unit is given. Say --travel 50mm for 50 mm up and down",
-            )
-        wheel = ends
-    ends = None if rack is None else _interval(rack.split(":"))
-    if rack is not None and ends is None:
+        wheel = travel_samples(file, travel, SAMPLES)
+    ends = None if rack is None else _interval(rack.split(":"), FARTHEST)
+    if rack is not None and (ends is None or ends[0] == ends[1]):
         raise fault(
             file,
             "--rack",
@@ -98,18 +84,52 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
             f" {FARTHEST:g} m, in metres unless a unit is given. Say --rack 40mm for 40 mm to the"
             " right, then to the left",
         )
-    return Travels(np.linspace(*wheel, samples), ends)
+    return Travels(wheel, ends)
 
 
-def _interval(parts: Sequence[str]) -> tuple[float, float] | None:
+def travel_samples(
+    file: Path, text: str, count: int, *, still: bool = False, farthest: float = FARTHEST
+) -> Array:
+    """Return the samples of the option --travel: LENGTH:SAMPLES up and down, or
+    START:STOP:SAMPLES, in metres without a unit.
+
+    Args:
+        count: number of samples, unless the text says one.
+        still: whether one place is a travel too.
+        farthest: longest travel [m].
+
+    Raises:
+        CaseError: the text is no travel.
+    """
+    *parts, last = text.split(":")
+    counted = bool(parts) and last.strip().isdecimal()
+    ends = _interval(parts if counted else [*parts, last], farthest)
+    if counted and len(parts) == 1 and ends == (0.0, 0.0):
+        ends = None
+    place = ends is not None and ends[0] == ends[1]
+    samples = int(last) if counted else 1 if place else count
+    if ends is None or (place and not still) or not 2 - still <= samples <= MOST_SAMPLES:
+        limit = f", up to {farthest:g} m" if np.isfinite(farthest) else ""
+        raise fault(
+            file,
+            "--travel",
+            f"found {shown(text)}, expected a length such as 50mm, or LENGTH:SAMPLES, 2 to"
+            f" {MOST_SAMPLES} of them, or START:STOP:SAMPLES{limit}, in metres unless a unit"
+            f" ({', '.join(LENGTHS)}) is given. Say --travel 50mm for 50 mm up and down"
+            f"{', or --travel=20mm:20mm:1 for one place' * still}",
+        )
+    return np.linspace(*ends, samples)
+
+
+def _interval(parts: Sequence[str], farthest: float) -> tuple[float, float] | None:
     """Return the ends of LENGTH, which goes both ways, or of START:STOP; None for another text."""
     try:
         numbers, _ = interval(parts, LENGTHS, "m")
     except ValueError:
         return None
-    if len(numbers) == 1 and numbers[0] > 0.0:
-        numbers = [-numbers[0], numbers[0]]
-    if len(numbers) != 2 or not all(abs(each) <= FARTHEST for each in numbers):
+    if len(numbers) == 1 and numbers[0] >= 0.0:
+        numbers = [0.0 - numbers[0], numbers[0]]
+    if len(numbers) != 2 or not all(abs(each) <= farthest for each in numbers):
         return None
     return numbers[0], numbers[1]
 
