@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import number_of
 from ...harness.record import Record, Results
-from ...report.axis import ZERO
+from ...report.axis import ENDLESS, ZERO
 from ...trajectory import Array
 from ...unit_text import unit_text, with_unit
 from .results import WHEEL_LOAD, ComplianceCurves, ComplianceResults
@@ -47,7 +47,8 @@ def shown_unit(unit: str) -> tuple[str, float]:
 
 def digits(value: float, count: int = 6) -> str:
     """Return a number of the terminal or the summary; round-off is zero."""
-    return "0" if abs(value) < ZERO else f"{value:.{count}g}"
+    whole = 10.0**count <= abs(value) < ENDLESS
+    return "0" if abs(value) < ZERO else f"{value:{'.0f' if whole else f'.{count}g'}}"
 
 
 def as_data(results: ComplianceResults) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ...mechanism.motions import Driver, JointDisplacement, Motion, PointCoordinate, Ramp, Table
 from ...trajectory import Array
 from .options import WheelOptions
-from .suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
+from .suspension import SWING_ARMS, Axle, Convention, Side, SuspensionOutput, Vehicle
 from .suspension.corner import MARKER_DISTANCE
 from .suspension.wheel import Place
 from .suspension_section import with_slopes
@@ -360,6 +360,7 @@ def with_suspension_outputs(
     motion: str | None,
     *,
     steered: bool = False,
+    swing_arms: bool = False,
 ) -> Case:
     """Return the case with the suspension outputs, their slopes, and the coordinates of the
     template's watched points.
@@ -368,6 +369,7 @@ def with_suspension_outputs(
         vehicle: the vehicle around the wheel.
         motion: motion of both wheels; None for one wheel.
         steered: whether the rack moves during the wheel's travel.
+        swing_arms: whether instant centres and swing arms are among them.
     """
     extent, types = size(case), SuspensionOutput.registry
     outputs = list[Quantity]()
@@ -381,7 +383,7 @@ def with_suspension_outputs(
         vehicles = {f"{side}_": _on_side(vehicle, side) for side in Side}
     place = Place.WHEEL_CENTER if vehicle.wheel_radius is None else Place.CONTACT
     for prefix, wheel in vehicles.items():
-        for kind in _wheel_outputs(vehicle):
+        for kind in _wheel_outputs(vehicle, swing_arms=swing_arms):
             add(prefix + kind, kind, wheel)
         add(f"{prefix}half_track_change", "half_track_change", wheel, at=place)
         for name, ends in template.springs.items():
@@ -430,9 +432,12 @@ def _on_side(vehicle: Vehicle, side: Side) -> Vehicle:
     )
 
 
-def _wheel_outputs(vehicle: Vehicle) -> Iterator[str]:
+def _wheel_outputs(vehicle: Vehicle, *, swing_arms: bool) -> Iterator[str]:
     """Yield the types of the outputs of a wheel that the data of its vehicle define."""
     yield from ("toe", "camber")
+    for each in SWING_ARMS if swing_arms else ():
+        if vehicle.wheel_radius is not None or "wheel_radius" not in each.needs:
+            yield each.type
     if vehicle.kingpin:
         yield from ("caster", "kingpin_inclination")
     if vehicle.wheel_radius is None:

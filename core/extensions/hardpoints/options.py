@@ -101,6 +101,11 @@ class HardpointOptions(ReaderOptions):
         "share of the driving force at this axle, 0 to 1",
         metavar="X",
     )
+    swing_arms: bool = switch(
+        "add the instant centres and swing arms in the views from the front and from the side to"
+        " the outputs: length, angle and coordinates",
+        heading=HARDPOINTS,
+    )
     bushings: Path | None = None
 
 

@@ -17,7 +17,7 @@ def table(tmp_path_factory):
     return file
 
 
-def test_table_without_spring_has_no_wheel_rate(table, tmp_path, capsys):
+def test_table_without_spring_lacks_rate(table, tmp_path, capsys):
     files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "out")]
     assert main(["kc", str(table), "--travel=-20mm:20mm:3", *files]) == 0
     found = json.loads((tmp_path / "json").read_text())
@@ -80,6 +80,6 @@ def test_other_springs_are_refused(table, capsys, spring, said):
     assert said in capsys.readouterr().err
 
 
-def test_case_without_motion_ratio_is_told_of_forces():
+def test_case_without_ratio_names_forces():
     with pytest.raises(KincheckError, match=r'Add \[forces.NAME\] type = "spring_damper"'):
         kincheck.compliance("mcpherson_strut_loaded", [0.0], springs={"spring": 1e4})
