@@ -44,8 +44,6 @@ from .steps import (
     HEADROOM,
     LOOSE,
     OUTCOME,
-    RESIDUAL,
-    RESIDUAL_FLOOR,
     SAME_SAMPLE,
     SEEN,
     TIME,
@@ -60,10 +58,17 @@ from .steps import (
 )
 from .store import Pair, RunRow, Store
 from .subjects import Subject
-from .values import largest, largest_difference, quantities, same_samples, values_of
+from .values import (
+    NO_REASON,
+    largest,
+    largest_difference,
+    quantities,
+    same_samples,
+    solution_changes,
+    values_of,
+)
 
 PHASES = ("build", "first", "warm", "compare")
-NO_REASON = "no reason is given"
 
 References: TypeAlias = Mapping[str, Mapping[str, OutputSeries]]
 """True values by case and output."""
@@ -314,10 +319,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
             usual = _usual_times(before, old, history.pairs.get(record.pair, ()), history)
             findings += _slower(record, *usual if alike else (None, usual[1]), now, slowest)
         if old.solved and record.solved:
-            solutions += _numbers(record, old)
-            solutions += _residual(record, old)
-            solutions += _units(record, old)
-            solutions += _gone(record, old)
+            solutions += solution_changes(record, old)
     unfinished = set(now.results.missing)
     findings += [
         Finding.of(Kind.ABSENT, old, f"{old.outcome.shown} there")
@@ -514,77 +516,6 @@ def _slower_on_machine(
     yield from _slower(
         now, usual, statistics.median(in_loops) if in_loops else None, subject, limit
     )
-
-
-def _numbers(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield changes of dof and rank, and numbers that are null now."""
-    for name, kind in (("dof", Kind.FREEDOM), ("rank", Kind.RANK)):
-        old, new = getattr(before, name), getattr(now, name)
-        if None not in (old, new) and new != old:
-            message = f"{name} {old} → {new}"
-            yield Finding.of(kind, now, message, before=float(old), now=float(new))
-    for name in ("dof", "rank", "residual_max"):
-        old = getattr(before, name)
-        if old is not None and getattr(now, name) is None:
-            why = now.reasons.get(name) or NO_REASON
-            yield Finding.of(
-                Kind.GONE, now, f"{name} has no value now, {number(old)} before: {why}"
-            )
-
-
-def _residual(now: Record, before: Record) -> Iterator[Finding]:
-    old, new = before.residual_max, now.residual_max
-    if old is None or new is None or new < RESIDUAL * max(old, RESIDUAL_FLOOR):
-        return
-    ratio = new / old if old else None
-    times = f" (×{number(ratio)})" if ratio else ""
-    message = f"largest residual {number(old)} → {number(new)}{times}"
-    about = {"before": old, "now": new, "ratio": ratio, "limit": RESIDUAL}
-    yield Finding.of(Kind.RESIDUAL, now, message, **about)
-
-
-def _units(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield outputs with a changed unit or positive sense."""
-    for output, old in before.outputs.items():
-        new = now.outputs.get(output)
-        for what in ("unit", "sense"):
-            a, b = getattr(old, what), getattr(new, what, None)
-            if new is not None and a != b:
-                message = f"{output}: {what} {a or 'none'} → {b or 'none'}"
-                yield Finding.of(Kind.UNIT, now, message, output=output)
-
-
-def _gone(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield motions of outputs with null in place of earlier numbers, unless another finding
-    reports it: motions no longer compared, and samples no longer solved, at which no output has a
-    position.
-    """
-    if not same_samples(now, before):
-        return
-    series = [output.position for output in now.outputs.values()]
-    count = max(map(len, series), default=0) if (now.solved or 0) < (before.solved or 0) else 0
-    unsolved = {
-        k for k in range(count) if all(k >= len(each) or each[k] is None for each in series)
-    }
-    for each in quantities(now, before):
-        if each.was_judged is not None and each.judged is None:
-            continue
-        had = [k for k, value in enumerate(each.old) if value is not None]
-        there = {k for k, value in enumerate(each.new) if value is not None}
-        lost = [k for k in had if k not in there and k not in unsolved]
-        if lost:
-            at = [
-                f"{name} = {number(values[lost[0]])}"
-                for name, values in now.driver.items()
-                if lost[0] < len(values)
-            ]
-            new = now.outputs.get(each.output)
-            why = "the case has no such output now" if new is None else new.reason or NO_REASON
-            message = (
-                f"{each.word} has no value at {len(lost)} of {len(had)} samples that had one,"
-                f" first at {at[0] if at else f'sample {lost[0]}'}: {why}"
-            )
-            yield Finding.of(Kind.GONE, now, message, **each.place)
 
 
 def loose(history: History, cases: Facts) -> list[Loose]:

@@ -174,8 +174,8 @@ def test_unknown_branch_lists_known_ones(path):
     nights(path, 2)
     assert (
         reported(path, against="mian-baseline").reason
-        == "no earlier run of branch 'mian', without changes to its files, with any of its pairs;"
-        " the history has branches main"
+        == "no earlier run of branch 'mian', without changes to its files, with any of its pairs."
+        " The history has branches main"
     )
 
 
@@ -239,7 +239,7 @@ def test_step_has_unit_of_output(path, capsys):
     grown = {"errors": lambda errors: errors | {"x": _grown(errors["x"])}}
     keep(path, changed(records(), **grown), cases=facts)
     assert history(path, "--case", "first") == 0
-    assert " → 1e-10 deg/s² since run 3" in capsys.readouterr().out
+    assert " → 1e-10 °/s² since run 3" in capsys.readouterr().out
 
 
 def _grown(deviations):

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from kincheck.core.extras import THREADS
-from kincheck.core.harness.execution import solve_in_process
+from kincheck.core.harness.execution import LONGEST_MESSAGE, solve_in_process
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
@@ -69,7 +69,7 @@ def test_engine_faults_become_records():
         record = found[kind, "bad"]
         assert (kind, record.outcome) == (kind, outcome)
         assert message in record.message
-        assert len(record.message) < 3000
+        assert len(record.message) < LONGEST_MESSAGE + 100
         assert record.version == "1.2"  # it was told before the fault
         assert found[kind, "good"].outcome is Outcome.PASS
     # the line that crashed, the end of what was printed, and no more

@@ -252,7 +252,7 @@ def test_damage_during_run_costs_no_result(kincheck_main, path, tmp_path, capsys
     assert kincheck_main("run", *cases, "--history", path, "--out", out, cases=cases) == 2
     said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("[")]
     assert len(said) == 1
-    assert "the records before b native are stored as run 1" in said[0]
+    assert "The records before b native are stored as run 1" in said[0]
     assert len(json.loads((out / "results.json").read_text())["records"]) == 3
     assert NO_TRENDS in (out / "report.html").read_text()
 

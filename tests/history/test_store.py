@@ -333,7 +333,7 @@ def test_full_disk_keeps_stored_records(path):
     keeping.end(results, interrupted=False)
     (problem,) = keeping.problems
     assert problem.startswith(
-        f"history {path}: cannot be written: database or disk is full; make room; the records"
+        f"history {path}: cannot be written: database or disk is full; make room. The records"
         " before "
     )
     assert len(results.records) == 40  # the run went on

@@ -15,10 +15,10 @@ from kincheck.core import (
 )
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, cross, turned_by
+from kincheck.core.extensions.laboratory.paper.rows import LockTest, PaperDot12
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
-from kincheck.core.primitives.dot12 import LockTest, PaperDot12
 
 from ..oracles import naive
 from ..support.mechanisms import ORIGIN, solve_all

@@ -125,13 +125,13 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
         elif _is_standard_output(path):
             found.append(
                 f"{option} {path}: found the file that standard output goes to, expected one of its"
-                " own; give another"
+                " own. Give another"
             )
         elif path.exists() and not path.is_file():
             continue  # several options may write to one pipe or device
         elif (other := seen.setdefault(os.path.realpath(path), option)) != option:
             found.append(
-                f"{option} {path}: found the file of {other}, expected one of its own; give another"
+                f"{option} {path}: found the file of {other}, expected one of its own. Give another"
             )
     return found
 

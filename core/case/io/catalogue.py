@@ -103,7 +103,11 @@ def output_tables() -> dict[str, Rows]:
     )
     return {
         of_all: _rows(Measure.registry, lambda cls: (keys(cls),)),
-        **{each.heading: [row(*one) for one in sorted(each.types.items())] for each in sections()},
+        **{
+            each.heading: [row(*one) for one in sorted(each.types.items())]
+            for each in sections()
+            if each.types
+        },
     }
 
 
@@ -191,7 +195,7 @@ def case_schema() -> dict[str, Any]:
         "units": UnitsKeys,
         "closure": ClosureKeys,
         "sweep": SweepKeys,
-        **{each.key: each.keys for each in sections()},
+        **{each.key: each.keys for each in sections() if each.types},
         "reference": ReferenceKeys,
     }
     motions = _structs(Motion.registry)

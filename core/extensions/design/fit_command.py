@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any, TextIO, cast
-
-import numpy as np
 
 from ...case.io.reader_options import CurveOptions
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
 from ...errors import refuse
 from ...options import destination, group, json_file, option, options
-from .new_table import require_new, table_of, write_new
 
 DRAWING = "+- 2 mm"
 
@@ -68,6 +67,8 @@ class Fit(OfCase):
             KincheckError: a file or an option makes no sense, or the table does not reach the
                 travel of the rig.
         """
+        from .new_table import table_of
+
         return self._fitted(table_of(self, registry)[0])
 
     def _fitted(self, case: Case) -> Fitted:
@@ -82,6 +83,7 @@ class Fit(OfCase):
         from ...report.terminal import with_json
         from .fit import Verdict
         from .fit_views import page, report
+        from .new_table import require_new, table_of, write_new
 
         require_new(self.out)
         refuse(self.unwritable())
@@ -111,7 +113,7 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
 
     def shifted(each: Shift) -> dict[str, Any]:
         about = {"name": each.name, "unit": each.si, "p": each.chance}
-        return about | (interval(each.size, each.deviation) if np.isfinite(each.deviation) else {})
+        return about | (interval(each.size, each.deviation) if isfinite(each.deviation) else {})
 
     rig, deviations = found.rig, found.deviations
     return {
@@ -122,7 +124,7 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
         "misfit": found.first.misfit,
         "numbers": rig.count,
         "noise": {
-            goal.output: {"deviation": float(np.median(noise)), "source": what}
+            goal.output: {"deviation": median(noise), "source": what}
             for goal, noise, what in zip(rig.goals, rig.noise, rig.sources, strict=True)
         },
         "directions": [
@@ -175,4 +177,4 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
 
 def _plain(values: Array) -> list[float | None]:
     """Return numbers, None for unknown ones."""
-    return [x if np.isfinite(x) else None for x in values.tolist()]
+    return [x if isfinite(x) else None for x in values.tolist()]

@@ -9,7 +9,6 @@ from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
 from ...errors import refuse
 from ...options import destination, json_file, option, options, whole
-from .new_table import require_new, table_of
 
 if TYPE_CHECKING:
     from .tune import Tuned
@@ -59,6 +58,7 @@ class Tune(OfCase):
             KincheckError: a goal or move makes no sense, the table does not reach its travel, or
                 another engine contradicts the answer.
         """
+        from .new_table import table_of
         from .tune import tune
 
         case, file = table_of(self, registry)
@@ -69,6 +69,7 @@ class Tune(OfCase):
         from ...report.sections import print_report
         from ...report.terminal import with_json
         from ..hardpoints.saving import write_table
+        from .new_table import require_new
 
         require_new(self.out)
         refuse(self.unwritable())

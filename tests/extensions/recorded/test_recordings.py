@@ -390,7 +390,7 @@ def test_unequal_event_rows_need_option(judged, table, capsys):
 
     file = table("fourbar_xyzw.csv", changed)
     assert judged(file, *maps(XYZW))[0] == 2
-    assert 'say which rows to take: --map "event=first"' in capsys.readouterr().err
+    assert 'Say which rows to take: --map "event=first"' in capsys.readouterr().err
     assert judged(file, *maps(XYZW), "--map", "event=first")[0] == 0
     assert judged(file, *maps(XYZW), "--map", "event=last")[0] == 1
 
