@@ -47,7 +47,7 @@ def expected(name, at, travel):
 
 @pytest.mark.parametrize("axes", ["forward,left,up", "forward,right,up"])
 @pytest.mark.parametrize("name", ["double_wishbone", "mcpherson", "five_link"])
-def test_instant_centers_equal_drawn_ones(tmp_path, name, axes):
+def test_instant_centers_equal_drawn(tmp_path, name, axes):
     file, at = tmp_path / "car.csv", TEMPLATES[name].sample
     file.write_text(sample_table(TEMPLATES[name]).replace("forward,left,up", axes))
     side = "right" if "right" in axes else None
@@ -59,7 +59,7 @@ def test_instant_centers_equal_drawn_ones(tmp_path, name, axes):
         assert {key: found[key][k] for key in true} == pytest.approx(true, rel=CLOSE, abs=CLOSE)
 
 
-def test_planar_arms_meet_in_the_instant_center(tmp_path):
+def test_planar_arms_meet(tmp_path):
     """Level pivots across the car: the front view's arms, produced, meet 3 m from the wheel."""
     at = {role: (x, y, z) for role, (x, y, z) in TEMPLATES["double_wishbone"].sample.items()}
     meet = np.array([-2.4, 0.5])
@@ -84,7 +84,7 @@ def test_planar_arms_meet_in_the_instant_center(tmp_path):
     assert found["side_view_swing_angle"] == pytest.approx(0.0, abs=CLOSE)
 
 
-def test_swing_arms_are_there_if_asked(tmp_path):
+def test_swing_arms_need_the_option(tmp_path):
     file = tmp_path / "car.csv"
     file.write_text(sample_table(TEMPLATES["mcpherson"]))
     names = {each.type for each in SWING_ARMS}
