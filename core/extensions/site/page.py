@@ -119,7 +119,8 @@ def _board(folder: Path, path: Path, found: Board) -> Iterator[Line]:
     for each in found.rows:
         error = number(each.runs[-1].error if each.runs else None)
         made = [path.parent / each.folder / "run.py"] if each.folder else []
-        link = _link(folder, path, *made, path.with_suffix(".html"))
+        own = [path.with_name("index.html")] if path.parent.name else []
+        link = _link(folder, path, *made, *own)
         bad = each.state in ("timeout", "crashed")
         yield (each.case, each.name, each.version, each.state, error), link, bad
 
