@@ -42,8 +42,8 @@ class FromDesign(Supplied):
 
     travel: str | None = option(
         "travel of the wheel from design, or of the steering with --axle steer: up and down,"
-        " default 60mm:25, as in kincheck run; or START:STOP:SAMPLES, positive up:"
-        " --travel=-40:60mm:21; in metres without a unit",
+        " default 60mm:25, as in kincheck run, or START:STOP:SAMPLES, positive up:"
+        " --travel=-40:60mm:21. In metres without a unit",
         metavar="LENGTH[:N]|A:B:N",
         heading=HARDPOINTS,
     )
@@ -66,14 +66,14 @@ class MeasureCompliance(Isolated):
     )
     load: tuple[str, ...] = option(
         "curve over a load at design, as lateral=-3000:3000:31 [N, N m]: longitudinal, lateral,"
-        " braking or aligning; 25 samples unless given; one number is a load that acts over all"
-        " travel; may be repeated",
+        " braking or aligning, 25 samples unless given. One number is a load that acts over all"
+        " travel. May be repeated",
         metavar="NAME=A:B:N",
         several="repeated",
     )
     bushings: Path | None = option(
         "bushings of the joints, in SI: TOML, for a table of hardpoints by role,"
-        " [bushings.ROLE], as kincheck templates NAME --bushings prints; else tables"
+        " [bushings.ROLE], as kincheck templates NAME --bushings prints, else tables"
         " [joints.NAME.bushings.X] as in case files",
         Path,
         "FILE",
@@ -81,7 +81,7 @@ class MeasureCompliance(Isolated):
     spring: tuple[str, ...] = option(
         "spring between two points of the case, by the name of its motion ratio without _ratio, of"
         ' an axle on both sides: --spring "spring: 35 N/mm", with its force at design'
-        ' "spring: 35 N/mm, 3 kN"; "tire: 200 N/mm" is under the wheel, for the ride rate; may be'
+        ' "spring: 35 N/mm, 3 kN". "tire: 200 N/mm" is under the wheel, for the ride rate. May be'
         " repeated",
         metavar='"NAME: RATE"',
         several="repeated",
@@ -96,7 +96,7 @@ class MeasureCompliance(Isolated):
         "store the records of native and of these engines in this file, as kincheck run does", Path
     )
     csv: Path | None = destination("write the curves, in mm, deg, N, kN", Path)
-    json: str | None = destination("write the results in SI; - for standard output")
+    json: str | None = destination("write the results in SI, - for standard output")
     out: Path | None = destination("write the page DIR/kc.html, and results.json", Path, "DIR")
     joint_type: tuple[str, ...] = joint_types()
     supplied: FromDesign = group(default_factory=FromDesign)
@@ -249,7 +249,7 @@ def _values(option: str, text: str, units: Mapping[str, Unit]) -> list[float]:
     if not all(map(math.isfinite, ends)) or not count.isdecimal() or not 1 <= int(count) <= MOST:
         raise KincheckError(
             f"{option} {text}: expected START:STOP:SAMPLES or START:STOP, numbers in"
-            f" {' or '.join(units)}, {bare} without a unit, and 1 to {MOST} samples; write"
+            f" {' or '.join(units)}, {bare} without a unit, and 1 to {MOST} samples. Write"
             f" -60{other}:60{other}:25"
         )
     start, stop, steps = ends[0], ends[-1], max(1, int(count) - 1)

@@ -96,7 +96,7 @@ def compliance(
     given = DEFAULT_TRAVEL if travel is None else np.asarray(travel, dtype=np.float64)
     for name in loads or {}:
         if name not in list(Load):
-            raise KincheckError(f"load {name!r} is none of {', '.join(Load)}; give one of these")
+            raise KincheckError(f"load {name!r} is none of {', '.join(Load)}. Give one of these")
     every = {Load(name): np.asarray(values, float) for name, values in (loads or {}).items()}
     always = {load: values for load, values in every.items() if not values.ndim}
     over_travel = study.over_travel(given, always)
@@ -118,8 +118,8 @@ class _Study:
         self.wheels = wheels_of(case, held, soft)
         if len(self.wheels) == 1 and axle is not AxleMotion.HEAVE:
             raise KincheckError(
-                f"{case.name}: --axle {axle} needs both wheels of an axle, and the case has one;"
-                " add [suspension.other], or leave the option out"
+                f"{case.name}: --axle {axle} needs both wheels of an axle, and the case has one."
+                " Add [suspension.other], or leave the option out"
             )
         self.steering = _steering(case, held, self.wheels) if axle is AxleMotion.STEER else ""
         self.mechanism: Mechanism = replace(
@@ -253,8 +253,8 @@ class _Study:
             taken.remove(WHEEL_LOAD)
         if twice := sorted(outputs.keys() & taken):
             raise KincheckError(
-                f"{self.case.name}: output {twice[0]!r} has the name of a result of kincheck kc;"
-                " give it another name"
+                f"{self.case.name}: output {twice[0]!r} has the name of a result of kincheck kc."
+                " Give it another name"
             )
         outputs |= own
         load = wheel.lift * found.efforts[wheel.travel]
@@ -503,17 +503,17 @@ def lacking(case: Case, soft: Mechanism) -> dict[str, str]:
     for output in case.outputs:
         read = {*output.forces} - known
         if isinstance(output, PerTravel) and output.of_output.orders < ORDERS:
-            found[output.name] = "a slope of a slope; kincheck run has it for rigid joints"
+            found[output.name] = "a slope of a slope, which kincheck run has for rigid joints"
         elif isinstance(output, DriverEffort) and output.at is not None:
             found[output.name] = (
-                "an effort at another joint follows the motion of rigid joints; kincheck run has it"
+                "an effort at another joint follows the motion of rigid joints. kincheck run has it"
             )
         elif {*output.facts.get(HELD_BUT, ())} - held or read & drivers:
-            found[output.name] = "its driver is free here; name it in [compliance] held"
+            found[output.name] = "its driver is free here. Name it in [compliance] held"
         elif read:
             (name, *_) = read
             found[output.name] = (
-                f"joint {name!r} gives way to its bushings; give them as [forces.NAME], and ask for"
+                f"joint {name!r} gives way to its bushings. Give them as [forces.NAME], and ask for"
                 " their element_force"
             )
     return found
@@ -529,7 +529,7 @@ def _steering(case: Case, held: Sequence[str], wheels: Sequence[Wheel]) -> str:
     if not others:
         raise KincheckError(
             f"{case.name}: --axle steer needs a held driver of the steering, and all held drivers"
-            " lift wheels; add one to the case"
+            " lift wheels. Add one to the case"
         )
     return case.sweep.driver if case.sweep.driver in others else others[0]
 

@@ -159,8 +159,8 @@ def failures(results: ComplianceResults) -> list[str]:
     if not every:
         return []
     more = len(every) - MOST_SAID
-    rest = f"{number_of(more, 'further sample')} without equilibrium; " if more > 0 else ""
-    return [*every[:MOST_SAID], f"{rest}give less travel or load, or stiffer springs and bushings"]
+    rest = f"{number_of(more, 'further sample')} without equilibrium. " if more > 0 else ""
+    return [*every[:MOST_SAID], f"{rest}Give less travel or load, or stiffer springs and bushings"]
 
 
 def lines(results: ComplianceResults) -> Iterator[str]:

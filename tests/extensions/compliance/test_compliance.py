@@ -230,7 +230,7 @@ def test_load_beyond_equilibrium_is_counted(tmp_path, capsys):
     assert "nan" not in out + (tmp_path / "kc.html").read_text().partition('id="matrix"')[2]
     said = err.splitlines()
     assert "no equilibrium at travel -0.06 m with braking 3e+09 N: the last is" in said[-6]
-    assert "2 further samples without equilibrium; give less travel or load" in said[-1]
+    assert "2 further samples without equilibrium. Give less travel or load" in said[-1]
 
 
 @pytest.mark.parametrize(
