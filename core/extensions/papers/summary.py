@@ -61,8 +61,9 @@ def _fitted(sections: Sequence[Section]) -> Iterator[_Part]:
     """Yield the sections, shortened so that all fit on one page."""
     room = ROOM
     for k, section in enumerate(sections):
-        # the other sections keep two fifths of the room at least
-        mine = (room if k == len(sections) - 1 else 0.6 * room) - HEAD
+        # the sections below keep their room, up to two fifths of it
+        below = sum(map(_height, sections[k + 1 :]))
+        mine = room - min(below, 0.4 * room) - HEAD
         verdict = _within(mine, [_short(each, LONG) for each in section.verdict], _sentence)
         mine -= sum(map(_sentence, verdict))
         cells = [[_short(cell, CELL) for cell in row] for row in section.rows]
@@ -73,6 +74,11 @@ def _fitted(sections: Sequence[Section]) -> Iterator[_Part]:
         notes = [_short(each, LONG // 2) for each in section.notes[:1]]
         made = replace(section, verdict=verdict, rows=rows, wrong=wrong, notes=notes, diagrams=())
         yield _Part(made, left)
+
+
+def _height(section: Section) -> float:
+    """Return the height of a whole section [pt]."""
+    return HEAD + sum(map(_sentence, section.verdict)) + sum(map(_row, section.rows))
 
 
 def _within(room: float, parts: Sequence[T], height: Callable[[T], float]) -> list[T]:
