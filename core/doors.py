@@ -49,6 +49,7 @@ class Extension:
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
         sources: options added to commands with engines; see `cli.engine_source.EngineSource`.
+        forms: options for further forms of a page; see `cli.forms.Form`.
         writers: function to write a mechanism in each format; see `case.io.model_writer`.
         codes: function for the files of a solved case in a language, by their names.
         formats: who reads each format, for the help.
@@ -74,6 +75,7 @@ class Extension:
     methods: _Table = field(default_factory=dict[str, str])
     sections: _Table = field(default_factory=dict[str, str])
     sources: _Table = field(default_factory=dict[str, str])
+    forms: _Table = field(default_factory=dict[str, str])
     writers: _Table = field(default_factory=dict[str, str])
     codes: _Table = field(default_factory=dict[str, str])
     formats: _Table = field(default_factory=dict[str, str])

@@ -19,7 +19,17 @@ function mechanism(box, drawing, name, trouble) {
   const [azimuth, elevation] = views[firstView(bounds)];
   const camera = { frame: drawing.start, azimuth, elevation, zoom: 1, pan: [0, 0] };
 
-  const draw = () => paint(box, drawing, motion, bounds, camera);
+  const names = box.querySelector("[data-layer=names]");
+  let isNew = true;
+  const draw = () => {
+    const clear = paint(box, drawing, motion, bounds, camera);
+    if (clear === undefined) return; // not in view yet
+    if (isNew && !clear) {
+      names.checked = false;
+      paint(box, drawing, motion, bounds, camera);
+    }
+    isNew = false;
+  };
   const limited = (value, low, high) => Math.min(Math.max(value, low), high);
 
   function show(frame) {

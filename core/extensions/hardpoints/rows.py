@@ -418,7 +418,7 @@ def _require_complete(
     exact = exact or (bool(lacking) and {*lacking} <= {*_REMARKS})
     if surplus or not exact or max(head.columns) >= filled:
         expected = [name or HEAD[0] for k, name in enumerate(head.names) if k in headed]
-        comma = "; a decimal comma needs semicolons between the fields" if delimiter == "," else ""
+        comma = ". A decimal comma needs semicolons between the fields" if delimiter == "," else ""
         raise fault(
             file,
             where,

@@ -472,6 +472,6 @@ def _replay(options: StressEngines, registry: Registry, engines: list[Engine]) -
                 print(f"  {found.message}")
     if idle := [engine.name for engine in engines if engine.name not in examined]:
         raise KincheckError(
-            f"no sample of {', '.join(idle)} was examined. Give another engine or other files."
+            f"no sample of {', '.join(idle)} was judged. Give another engine or other files."
         )
     return Status.DEVIATES if bad else Status.WITHIN

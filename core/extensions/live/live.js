@@ -1,6 +1,8 @@
 "use strict";
 // The live page: the page owns the design, and a server, or its own solver, answers for numbers.
 
+// number of edits whose times are measured, of --measure
+const MEASURED = Number(new URLSearchParams(location.search).get("measure"));
 const METRES = { mm: 0.001, cm: 0.01, m: 1, inch: 0.0254, in: 0.0254, foot: 0.3048, ft: 0.3048 };
 const DIRECTIONS = {
   forward: [0, 1],
@@ -297,8 +299,7 @@ function remembered(key, text) {
     parts.figures.group(one("#group").value);
     one("#group").onchange = () => parts.figures.group(one("#group").value);
     document.documentElement.dataset.ready = "";
-    const count = Number(new URLSearchParams(location.search).get("measure"));
-    if (count && parts.design) measureEdits(count);
+    if (MEASURED && parts.design) measureEdits(MEASURED);
     if (parts.sliders && message.solved.some(Boolean)) reached(null);
   }
 
@@ -325,6 +326,7 @@ function remembered(key, text) {
       state.latest += 1;
       const whole = performance.now() - state.asked;
       state.times.push(whole);
+      if (!MEASURED) return;
       const answer = Object.values(steps).reduce((total, each) => total + each, 0);
       const text = `answer ${answer.toFixed(0)} ms, edit to screen ${whole.toFixed(0)} ms`;
       one("#cost").textContent = text;

@@ -430,7 +430,7 @@ def _verdict(number: int, record: Record, *, last: bool) -> Verdict:
     return Verdict(
         id=number,
         engine=record.engine,
-        outcome=str(record.outcome),
+        outcome=record.outcome.shown,
         worst=None if most is None else most.ratio,
         output="" if most is None else most.output,
         message=record.message,

@@ -376,7 +376,7 @@ def test_spoilt_file_refuses_page(car, served, page):
 def test_check_gives_verdict_per_engine(page):
     page.say(type="check", engines=["native"], points=page.points, id=2)
     found = page.told("verdict")
-    assert (found["engine"], found["outcome"], found["last"]) == ("native", "unjudged", True)
+    assert (found["engine"], found["outcome"], found["last"]) == ("native", "not judged", True)
     assert "os:system" in page.refusal(type="check", engines=["os:system"], points=page.points)
 
 
