@@ -263,6 +263,31 @@ class BenchNumpy(Command):
 
 
 @options
+class BenchSize(Command):
+    """Measure how the native engine's cost grows with the size of a mechanism: chains of loops and
+    rings, by processor time. A step is the growth from one size to the next, as a multiple of the
+    growth of the size.
+    """
+
+    about = "the native engine's cost by size, and its steps"
+    loops: tuple[int, ...] = option("loops of chains", whole(1), "N", several="once", default=())
+    cranks: tuple[int, ...] = option("cranks of rings", whole(3), "N", several="once", default=())
+    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    json: str | None = json_file()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ...report.terminal import with_json
+        from .bench.growth import CRANKS, LOOPS, lines, measure
+
+        given = (self.loops, self.cranks) if self.loops or self.cranks else (LOOPS, CRANKS)
+        found = measure(*given, self.rounds)
+        with with_json(found, self.json) as console:
+            print(*lines(found), sep="\n", file=console.file)
+        return Status.WITHIN
+
+
+@options
 class BenchAll(Command):
     """Measure the engines on a few cases, and the formulation. This takes some minutes."""
 
@@ -273,6 +298,7 @@ class BenchAll(Command):
         "compliance": BenchCompliance,
         "curves": BenchCurves,
         "numpy": BenchNumpy,
+        "size": BenchSize,
     }
     out: Path | None = destination("write bench.json and bench.html there", Path, "DIR")
     json: str | None = json_file()

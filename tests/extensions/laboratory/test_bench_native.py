@@ -158,6 +158,15 @@ def test_motion_without_machine_code(capsys):
     assert "no case 'nosuch'" in capsys.readouterr().err
 
 
+def test_cost_by_size(capsys):
+    assert main("bench size --loops 1 2 --rounds 1 --json -".split()) == 0
+    found = json.loads(capsys.readouterr().out)["mechanisms"]
+    first, second = found["chain of four-bar loops"]
+    assert (first["size"], second["size"], first["step"]) == (1, 2, None)
+    assert second["step"] == pytest.approx(second["us_per_sample"] / first["us_per_sample"] / 2)
+    assert found["ring of cranks"] == []
+
+
 def test_growth_of_largest_sizes():
     timed = [(1, 1.0), (100, 2.0), (1000, 9.0), (10000, 200.0)]
     of = dict.fromkeys(("mechanism", "engine", "mode", "loop", "message"), "")
