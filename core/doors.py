@@ -49,11 +49,14 @@ class Extension:
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
         sources: options added to commands with engines; see `cli.engine_source.EngineSource`.
+        forms: options for further forms of a page; see `cli.forms.Form`.
         writers: function to write a mechanism in each format; see `case.io.model_writer`.
         codes: function for the files of a solved case in a language, by their names.
         formats: who reads each format, for the help.
         converters: function from a model's file to the text saved by a simulator.
         views: HTML of a result or a mechanism in a notebook.
+        proposals: function for the least moves of places that bring outputs of a case into bands;
+            see `live.table`.
         styles: formulation of a mechanism in each row style; see `kinematics.formulation.styles`.
         steppers: script of each stepper of free motion; see `adapters.steppers.scripts`.
     """
@@ -72,11 +75,13 @@ class Extension:
     methods: _Table = field(default_factory=dict[str, str])
     sections: _Table = field(default_factory=dict[str, str])
     sources: _Table = field(default_factory=dict[str, str])
+    forms: _Table = field(default_factory=dict[str, str])
     writers: _Table = field(default_factory=dict[str, str])
     codes: _Table = field(default_factory=dict[str, str])
     formats: _Table = field(default_factory=dict[str, str])
     converters: _Table = field(default_factory=dict[str, str])
     views: _Table = field(default_factory=dict[str, str])
+    proposals: _Table = field(default_factory=dict[str, str])
     styles: _Table = field(default_factory=dict[str, str])
     steppers: _Table = field(default_factory=dict[str, str])
 

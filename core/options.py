@@ -261,7 +261,7 @@ def function_of(name: str, command: Any, call: Callable[[Any], Any]) -> Callable
     import inspect  # slow
     from textwrap import fill
 
-    first = next(iter(option_fields(command)))[1]
+    first = next(meaning for each, meaning, _ in option_fields(command) if each.init)
 
     def found(*args: Any, **kwargs: Any) -> Any:
         if len(args) > 1 and first is not None and first.nargs == "+":

@@ -42,12 +42,16 @@ class Tabular:
         """Return the result as labelled arrays with units."""
         raise NotImplementedError
 
+    def drawn(self) -> Dataset:
+        """Return the result as it is drawn and shown, in the units of its source."""
+        return self.dataset()
+
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.summary()}>"
 
     def _repr_html_(self) -> str:
         """Return the table and the curves for a notebook."""
-        return notebook("result", f"{type(self).__name__}: {self.summary()}", self.dataset())
+        return notebook("result", f"{type(self).__name__}: {self.summary()}", self.drawn())
 
     def to_html(self) -> str:
         """Return the table and the curves as HTML, as a notebook shows them."""
@@ -106,13 +110,15 @@ class Tabular:
     def plot(self, *names: str) -> Figure:
         """Draw the curves with matplotlib, one diagram for each variable, and return the figure.
 
+        A record of a table of hardpoints is drawn in the table's units, everything else in SI.
+
         Args:
             names: variables to draw; by default all, or of a record the six that tell most.
 
         Raises:
             KincheckError: matplotlib is not installed, or there are no such curves.
         """
-        data = self.dataset()
+        data = self.drawn()
         curves = data.curves()
         for name in names:
             if name not in curves:

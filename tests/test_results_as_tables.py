@@ -87,8 +87,16 @@ def test_suspension_plot_has_six_curves(tmp_path):
     supplied = kincheck.Supplied(travel="0.05:3")
     record = kincheck.run(kincheck.load(tmp_path / "car.csv", supplied), "native").records[0]
     useful = ["toe", "camber", "caster", "roll_center_height", "half_track_change", "scrub_radius"]
-    drawn = [each.get_ylabel().split(" [")[0] for each in record.plot().axes]
-    assert drawn == useful
+    figure = record.plot()
+    assert [each.get_ylabel().split(" [")[0] for each in figure.axes] == useful
+    # in the units of the table, which the dataset is not
+    curve = figure.axes[0].lines[0]
+    assert figure.axes[0].get_ylabel() == "toe [deg]"
+    assert figure.axes[3].get_ylabel() == "roll_center_height [mm]"
+    assert figure.axes[-1].get_xlabel() == "stroke [mm]"
+    assert curve.get_xdata() == pytest.approx([-50.0, 0.0, 50.0])
+    assert curve.get_ydata() == pytest.approx(np.degrees(record.outputs["toe"].position))
+    assert record.dataset().variables["toe"].unit == "rad"
     assert len(record.plot("toe.velocity").axes) == 1
     html = record.to_html()
     assert html.count("<svg") == 6

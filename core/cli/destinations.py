@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
 from ..case.io.atomic_files import Content, Named, unwritable
 from ..case.io.table_file import WRITERS, lack
 from ..harness.record import Results, to_json
+from .forms import contents_of_forms, files_of_forms
 
 if TYPE_CHECKING:  # drawing code is imported only for a report
     from ..report.figures import Effort, Past
@@ -32,7 +33,8 @@ def files_of(options: object) -> dict[str, str | Path]:
     """Return the requested files by their options."""
     given: dict[str, Any] = {name: vars(options).get(name) for name in (*FILES, *WRITERS)}
     kinds = {name: str if name == "json" else Path for name in given}
-    return {name: file for name, file in given.items() if isinstance(file, kinds[name])}
+    found = {name: file for name, file in given.items() if isinstance(file, kinds[name])}
+    return found | files_of_forms(options)
 
 
 def not_in_history(options: object, why: object) -> str:
@@ -142,4 +144,5 @@ def deliver(
 
     if out is not None:
         contents += [(out / "results.json", encoded), (out / "report.html", write_page)]
+    contents += contents_of_forms(options, results)
     problems += terminal.deliver(contents, encoded, json, partial(show or print_table, results))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from ..errors import KincheckError, refuse, unknown
 from ..options import argument, destination, json_file, option, options, switch, verbosity, whole
 from ..report.progress import complain
+from .forms import contents_of_forms, with_forms
 from .parser import Command
 from .registry import Registry, Status
 from .shared_options import HISTORY
@@ -188,11 +189,12 @@ def _print_trends(history: History) -> None:
         print("no runs of these cases and engines")
 
 
+_Formed: Any = with_forms()
 OUT = ("regressions.json", "regressions.md", "junit.xml", "report.html")
 
 
 @options
-class ReportChanges(Command):
+class ReportChanges(_Formed, Command):  # pyright: ignore[reportUntypedBaseClass]
     """Report the changes since another run: new failures, fixes, lost results, lower accuracy,
     longer times, changed versions, the first run of each change, and tolerances to tighten.
 
@@ -277,7 +279,7 @@ def _contents(
     from ..harness.record import to_json
     from ..history.queries import NIGHTS, read
     from ..report.junit import to_regression_junit
-    from ..report.regressions import to_markdown, to_markup
+    from ..report.regressions import headline, to_markdown, to_markup
     from ..report.report import write_report
     from ..report.trends import trends
 
@@ -294,4 +296,6 @@ def _contents(
     folder = zip(OUT, (to_json(found), markdown, junit, page), strict=True)
     wanted = [] if options.out is None else [(options.out / name, each) for name, each in folder]
     named = ((options.markdown, markdown), (options.junit, junit))
-    return [*wanted, *((path, each) for path, each in named if path is not None)]
+    wanted += [(path, each) for path, each in named if path is not None]
+    said = headline(found) if found.against is not None else ""
+    return wanted + contents_of_forms(options, subject.results, said)

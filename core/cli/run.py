@@ -46,6 +46,7 @@ from ..report.progress import complain, explain_no_comparison, missing_requireme
 from . import shared_options
 from .class_loading import WHERE
 from .engine_source import RUN, WorkersError, given, names_of, options_for, sources
+from .forms import with_forms
 from .registry import Registry, Status, tell_left_out
 from .shared_options import HISTORY, MODE, MODES, TOL, Isolated, with_references
 
@@ -78,11 +79,12 @@ class _Plan:
 
 
 _Added: Any = options_for(RUN)
+_Formed: Any = with_forms()
 CURVES = "write the curves of all engines and references"
 
 
 @options
-class Run(Isolated, _Added):  # pyright: ignore[reportUntypedBaseClass]
+class Run(Isolated, _Added, _Formed):  # pyright: ignore[reportUntypedBaseClass]
     """Solve every case with every engine, judge each, print a table and write the requested files.
 
     Exit status: 0 all within tolerance, 1 something deviates or ends in an error, a timeout or a
@@ -93,7 +95,11 @@ class Run(Isolated, _Added):  # pyright: ignore[reportUntypedBaseClass]
     """
 
     about = "solve cases with engines and judge the results"
-    LAST = (*Isolated.LAST, *(each.name for each, *_ in option_fields(_Added) if not each.init))
+    LAST = (
+        *Isolated.LAST,
+        *_Formed.LAST,
+        *(each.name for each, *_ in option_fields(_Added) if not each.init),
+    )
     cases: str | Path | Case | Sequence[str | Path | Case] | None = argument(
         CASES, "CASE", "*", default=()
     )

@@ -41,6 +41,7 @@ from ..trajectory import PER_TIME, QUANTITIES, Array, Trajectory
 from ..unit_text import motion_word
 from . import labels
 from .record import Deviation, Deviations, Facts, OutputSeries
+from .table_units import driver_unit
 
 NO_VALUE = "has no value at"
 """Phrase of a reason: the standard has no value at some samples, so they are not judged."""
@@ -317,7 +318,7 @@ def describe(
     off, tolerance = (
         labels.shown_text(size, unit, facts, ".3g") for size in (worst.max_abs, worst.tolerance)
     )
-    driven = labels.driver_unit(facts) if facts.get("units") else ""
+    driven = driver_unit(facts) if facts.get("units") else ""
     place = labels.shown_text(values[worst.worst_step], driven, facts, ".9g")
     return (
         f"{output}: {word} is off by {off} at sample {worst.worst_step} ({driver} = {place}),"

@@ -7,12 +7,12 @@ from typing import Any, cast
 
 import msgspec
 
-from ..case.case import PER_TRAVEL, TIME, Case, Truth
-from ..case.units import ANGLES, LENGTHS
+from ..case.case import PER_TRAVEL, Truth
 from ..errors import number_of, shortened
 from ..trajectory import PER_TIME, QUANTITIES
 from ..unit_text import unit_text, value_text
 from .record import Facts, Outcome, Record, Results
+from .table_units import in_table_units
 
 TRUTHS = {
     Truth.CLOSED_FORM: "closed form",
@@ -138,52 +138,6 @@ def unread_count(count: int) -> str:
 def motion_unit(unit: str, motion: str) -> str:
     """Return the unit of a motion's derivative, e.g. m/s for a velocity in m."""
     return unit_text(unit + PER_TIME[QUANTITIES.index(motion)])
-
-
-DRIVER_UNITS = {
-    "point_coordinate": "m",
-    "joint_displacement": "m",
-    "joint_angle": "rad",
-    "time": "s",
-}
-"""SI unit of the values of a driver, by its type."""
-
-
-def driver_unit(facts: Facts) -> str:
-    """Return the SI unit of the swept driver, from the facts of a case; empty if unknown."""
-    return DRIVER_UNITS.get(facts.get("driver", {}).get("type", ""), "")
-
-
-def table_facts(case: Case) -> Facts:
-    """Return the units of a table of hardpoints, or of another file that is not in SI, and the type
-    of its driver, as a part of the facts of its case; empty for a file in SI.
-    """
-    driver = case.sweep.driver
-    kind = TIME if driver == TIME else case.mechanism.driver(driver).type
-    units = {"length": case.length_unit, "angle": case.angle_unit}
-    is_table, is_si = bool(case.hardpoints), [*units.values()] == ["m", "rad"]
-    if is_si and not is_table:
-        return {}
-    return {"units": units, "is_table": is_table, "driver": {"type": kind}}
-
-
-def is_table(facts: Facts) -> bool:
-    """Return whether a case is of a table of hardpoints; stored facts of old had units of tables
-    only.
-    """
-    return bool(facts.get("units")) and facts.get("is_table", True)
-
-
-def in_table_units(unit: str, facts: Facts) -> tuple[str, float]:
-    """Return the name of an SI unit in the units of the file of a case, and its size [SI]. Rates
-    of change per metre stay per metre, and forces and torques in N and N m.
-    """
-    measure, *per = unit.split("/", 1)
-    if "units" not in facts or measure not in ("m", "rad"):
-        return unit, 1.0
-    of = facts["units"]
-    found = LENGTHS[of["length"]] if measure == "m" else ANGLES[of["angle"]]
-    return "/".join([found.name, *per]), found.size
 
 
 def displayed(unit: str, facts: Facts) -> tuple[str, float]:

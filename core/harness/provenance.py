@@ -20,9 +20,9 @@ from ..case.notes import notes
 from ..mechanism.motions import Absolute, Motion, Slowed
 from ..version import VERSION
 from .compare import as_numbers
-from .labels import table_facts
 from .record import IDENTICAL, OutputSeries, Record, Results
 from .suspects import suspect
+from .table_units import table_facts
 
 
 def results(

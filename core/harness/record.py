@@ -8,6 +8,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -20,6 +21,7 @@ from ..errors import UnknownNameError, number_of
 from ..tabular import Tabular
 from ..trajectory import PER_TIME, QUANTITIES
 from .scene_record import Scene
+from .table_units import driver_unit, in_table_units
 
 Facts: TypeAlias = Mapping[str, Any]
 """Circumstances of a run, or facts of a case, as `Results.run` has them."""
@@ -44,6 +46,7 @@ class RecordTable(Tabular):
         message: Any
         driver: Any
         outputs: Any
+        table: Any
 
     __slots__ = ()
 
@@ -66,6 +69,20 @@ class RecordTable(Tabular):
         return Dataset(
             ("sample",), coords, variables, next(iter(coords), ""), self._shown([*variables])
         )
+
+    def drawn(self) -> Dataset:
+        """Return the dataset in the units of the case's table of hardpoints, or in SI."""
+
+        def converted(each: Variable, unit: str) -> Variable:
+            name, size = in_table_units(unit, self.table)
+            return Variable(each.dims, each.values / size, name)
+
+        data = self.dataset()
+        if not self.table or not data.x:
+            return data
+        swept = converted(data.coords[data.x], driver_unit(self.table))
+        variables = {name: converted(each, each.unit) for name, each in data.variables.items()}
+        return replace(data, coords={**data.coords, data.x: swept}, variables=variables)
 
     def _shown(self, names: list[str]) -> list[str]:
         """Return the variables that are drawn: all of a few; of more, the useful outputs of a
@@ -394,6 +411,8 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
         solved, samples: number of samples reached, and number of samples.
         us_per_step: time of the warm solve per sample [us] without waiting for the processor,
             including the forces of outputs; null unless all samples were reached.
+        table: units of a table of hardpoints, and the type of its driver; absent for other cases,
+            and in records of older versions.
         faults: what is wrong with an answer beside deviations: missing or contradicted samples,
             residual, balance of power, bodies, degrees of freedom; `message` repeats them. Empty in
             records of older versions.
@@ -426,6 +445,7 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
     reasons: dict[str, str] = {}
     details: dict[str, Any] = {}
     evidence: Evidence | None = None
+    table: dict[str, dict[str, str]] | msgspec.UnsetType = msgspec.UNSET
     faults: list[str] = []
 
     @property

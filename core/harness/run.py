@@ -18,6 +18,7 @@ from .engine import STANDARD, Engine, untimed
 from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, error_text, solve_in_process
 from .provenance import results, truth_of
 from .record import Deviations, Evidence, Outcome, Record, Results, Seconds
+from .table_units import table_facts
 from .verdict import (
     Standard,
     Verdict,
@@ -290,6 +291,7 @@ def _make_record(case: Case, engine: Engine, facts: Facts, **result: Any) -> Rec
     return Record(
         case=case.name,
         truth=truth_of(case),
+        table={**table_facts(case)} or msgspec.UNSET,
         engine=engine.name,
         mode=engine.mode,
         loop=facts.loop,

@@ -20,8 +20,9 @@ from ..trajectory import QUANTITIES, Array
 from ..unit_text import motion_word
 from .compare import Curve, as_array, curve_of, deviation
 from .engine import RECORDED, STANDARD
-from .labels import shown_text, table_facts
+from .labels import shown_text
 from .record import REFERENCE, Deviation, Deviations, Explanation, Facts, Record, Suspect
+from .table_units import table_facts
 
 # Largest number of outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12

@@ -20,8 +20,9 @@ from ..trajectory import QUANTITIES, Array
 from .compare import NO_VALUE, as_array, describe, deviations
 from .engine import STANDARD, Engine, bounds_error
 from .execution import Answer
-from .labels import against, driver_unit, shown_text, table_facts
+from .labels import against, shown_text
 from .record import Deviation, Deviations, Evidence, Outcome, Record
+from .table_units import driver_unit, table_facts
 
 UNCERTAIN = "uncertain_samples"
 """Key of a record's details: samples that were reached, but refused as uncertain."""

@@ -224,7 +224,7 @@ def _renamed(finding: Finding, subject: Subject, store: Store, found: Sequence[F
             old = state and base_record(store, state.run, pair, subject.facts)
             if state and old and old.solved and _alike(new, old):
                 message = (
-                    f"{finding.message}; looks like {gone.case} of run {state.run}: write"
+                    f"{finding.message}. It looks like {gone.case} of run {state.run}: write"
                     f' formerly = ["{gone.case}"] in the case file to go on with its history'
                 )
                 return msgspec.structs.replace(finding, message=message)
@@ -489,7 +489,7 @@ def _slower(
     should = max(expected)
     if seconds > limit * should and seconds - should > TIME_FLOOR:
         ratio = seconds / should
-        spread = f"×{number(ratio)}; by the spread from run to run, ×{number(limit)} may be chance"
+        spread = f"×{number(ratio)}: by the spread from run to run, ×{number(limit)} may be chance"
         message = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
         about = {"before": should, "now": seconds, "ratio": ratio, "limit": limit}
         yield Finding.of(Kind.SLOWER, now, message, **about)

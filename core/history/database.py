@@ -276,7 +276,7 @@ def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
 def damage_lines(path: Path, passed_over: Mapping[int, str]) -> list[str]:
     """Return a line for each unreadable run, up to MOST_LISTED of them."""
     runs = sorted(passed_over, reverse=True)
-    lines = [f"{passed_over[run]}; the other runs are used" for run in runs[:MOST_LISTED]]
+    lines = [f"{passed_over[run]}. The other runs are used" for run in runs[:MOST_LISTED]]
     if left := runs[MOST_LISTED:]:
         lines.append(
             f"history {path}: {len(left)} more runs cannot be read:"
@@ -296,16 +296,16 @@ def _is_damaged(error: Exception) -> bool:
 
 def _advice(message: str) -> str:
     known = {
-        "full": "make room",
-        "disk I/O": "check the disk: it may be full, or limit the size of files",
-        "readonly": "give a file that can be written",
-        "unable to open": "give a file in a folder that exists and can be written",
-        "locked": f"another process holds it for more than {BUSY:g} s; end that process",
-        "not a database": "give another file",
+        "full": "Make room",
+        "disk I/O": "Check the disk: it may be full, or limit the size of files",
+        "readonly": "Give a file that can be written",
+        "unable to open": "Give a file in a folder that exists and can be written",
+        "locked": f"Another process holds it for more than {BUSY:g} s. End that process",
+        "not a database": "Give another file",
     }
-    return "; " + next(
+    return ". " + next(
         (advice for part, advice in known.items() if part in message),
-        "it may be damaged: restore a copy of it",
+        "It may be damaged: restore a copy of it",
     )
 
 
@@ -344,7 +344,7 @@ def readable_connection(path: Path) -> sqlite3.Connection:
     """
     if not path.is_file():
         raise HistoryError(
-            f"history {path}: there is no such file; `kincheck run --history FILE` creates one"
+            f"history {path}: there is no such file. `kincheck run --history FILE` creates one"
         )
     # In a read-only folder the file has no journal beside it, so no process writes it.
     for how in ("mode=rw", "mode=ro&immutable=1"):
@@ -368,7 +368,7 @@ def readable_connection(path: Path) -> sqlite3.Connection:
         if not version:
             connection.close()
             raise HistoryError(
-                f"history {path}: it is empty; `kincheck run --history FILE` stores runs in it"
+                f"history {path}: it is empty. `kincheck run --history FILE` stores runs in it"
             )
         if version < len(MIGRATIONS):
             connection.close()

@@ -63,7 +63,7 @@ WHY: Mapping[Kind, str] = {
         "results are judged by other reference values than before: the reference or the case was"
         " edited"
     ),
-    Kind.RANK: "the engine solves other rows than before; with equal dof, the motion is the same",
+    Kind.RANK: "the engine solves other rows than before. With equal dof, the motion is the same",
     Kind.ADDED: "nothing to compare with",
     Kind.ABSENT: "not requested, or removed from the library: nothing is known of them",
 }

@@ -67,7 +67,7 @@ def find(name: str | None, store: Store | None) -> Subject:
     row = choose_state_run(rows, faultless(store, rows[:NIGHTS]), NIGHTS)
     if row is None:
         raise KincheckError(
-            f"history {store.path}: no run to report; `kincheck run --history {store.path}`"
+            f"history {store.path}: no run to report. `kincheck run --history {store.path}`"
             " records one"
         )
     later = [each.id for each in reversed(rows) if each.id > row.id]
@@ -225,7 +225,7 @@ class Keeping:
                 self.store.finish(self.run, results, "interrupted" if interrupted else "finished")
             except HistoryError as error:
                 self.problems.append(
-                    f"{error}. All records are stored, but run {self.run} has no end; --resume"
+                    f"{error}. All records are stored, but run {self.run} has no end. --resume"
                     " gives it one"
                 )
             else:

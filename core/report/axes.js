@@ -82,6 +82,9 @@ function apart(ticks, place) {
 function linearTicks(low, high, count, given) {
   let step = given || niceStep((0.75 * (high - low)) / count);
   while ((high - low) / step > 2 * count) step *= 2;
+  // two ticks or one tell no scale
+  const inside = () => Math.floor(high / step + 1e-9) - Math.ceil(low / step - 1e-9) + 1;
+  while (!given && inside() < 3) step = niceStep(step / 2.5);
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k <= high / step + 1e-9 && found.length < 100; k++) {
     const digits = Math.min(15, 2 + Math.ceil(Math.log10(Math.abs(k) + 1)));

@@ -15,8 +15,9 @@ from rich.text import Text
 from ..case.case import PER_TRAVEL
 from ..case.io.escape import visible
 from ..errors import shortened
-from ..harness.labels import DRIVER_UNITS, displayed, driver_unit, is_table
+from ..harness.labels import displayed
 from ..harness.record import Facts, Outcome, Record, Results
+from ..harness.table_units import DRIVER_UNITS, driver_unit, is_table
 from ..unit_text import value_text, with_unit
 from . import terminal
 
@@ -172,6 +173,9 @@ NAMES = (
 ZERO = 1e-9
 """Largest number that is printed as zero: the tolerance of outputs in the table's units."""
 
+WHOLE, ENDLESS = 9999.5, 1e7
+"""From the first on, four digits would need a power of ten; from the second on, they have one."""
+
 SOLVED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
 
 
@@ -232,8 +236,11 @@ def _rows(
 
 
 def number(value: float | None, scale: float = 1.0) -> str:
-    """Return a number to four digits; what is zero within the tolerance of outputs as 0."""
+    """Return a number to four digits, a larger one to its unit; what is zero within the tolerance
+    of outputs as 0.
+    """
     if value is None:
         return "–"
-    shown = f"{scale * value:.4g}" if abs(scale * value) > ZERO else "0"
+    size = abs(scale * value)
+    shown = f"{scale * value:{'.0f' if WHOLE <= size < ENDLESS else '.4g'}}" if size > ZERO else "0"
     return shown.replace("-", "\N{MINUS SIGN}")

@@ -70,7 +70,8 @@ function brush(pen) {
   return { pen, line, area, disc };
 }
 
-// A function that writes text beside a place without overlap, or omits it without room.
+// A function that writes text beside a place without overlap, or omits it without room. It returns
+// whether the first of the offsets is free.
 //   offsets: places to try: to the left (-1), over (0) or to the right (1), and down [px].
 function writer(pen, width, height, family, halo) {
   const written = [];
@@ -86,11 +87,12 @@ function writer(pen, width, height, family, halo) {
       left >= 2 && left + wide <= width - 2 && top >= 0 && top <= height - 14;
     const corners = offsets.map(([side, down]) => [x + aside(side), y + down - 10]);
     const corner = corners.find((each) => isFree(each) && isInside(each));
-    if (!corner) return;
+    if (!corner) return false;
     const [left, top] = corner;
     written.push([left, top, wide]);
     Object.assign(pen, { strokeStyle: halo, fillStyle: fill, lineWidth: 3 });
     pen.strokeText(text, left, top + 10);
     pen.fillText(text, left, top + 10);
+    return corner === corners[0];
   };
 }

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ..case.io.table_file import WRITERS, Kind, Rows, put_csv
-from ..harness.labels import DRIVER_UNITS, in_table_units, is_table
 from ..harness.record import Facts, OutputSeries, Record, Results
+from ..harness.table_units import DRIVER_UNITS, in_table_units, is_table
 
 COLUMNS: Mapping[str, Kind] = {
     "case": Kind.TEXT,

@@ -17,6 +17,7 @@ from ..harness.scene_record import Scene, SceneBody, SceneForce, SceneJoint, Sce
 from ..joints.base import unit
 from ..mechanism.mechanism import GROUND
 from .axis import Axis
+from .figures import COLOURS
 
 MARKS = {
     "revolute": "hinge",
@@ -47,8 +48,9 @@ class Drawing(msgspec.Struct):
     `bodies`.
 
     Attributes:
-        bodies: name, whether fixed, place of the axes (body frame), and poses: origins r [m] and
-            Euler parameters p, one for each frame of the scene or one only.
+        bodies: name, whether fixed, number of the colour, place of the axes (body frame), and
+            poses: origins r [m] and Euler parameters p, one for each frame of the scene or one
+            only. Bodies that mirror each other have one colour.
         nodes: body, and x, y, z in its frame [m].
         links: two nodes of one body.
         rods: two nodes of two bodies.
@@ -60,8 +62,9 @@ class Drawing(msgspec.Struct):
         wheels: body, centre [m] and axis of rotation in its frame, global upward direction, radius
             [m], nodes of the steering axis and a point of the vehicle's centre plane; empty if
             there are none.
-        arrows: body, place in its frame [m], label, and global force [N] in each frame of the
-            scene; null if unknown.
+        arrows: body, place in its frame [m], label, and global force in each frame of the scene;
+            null if unknown.
+        unit: of the arrows: N, or that of lengths, if they are moves of points.
         paths: nodes whose path over the frames is drawn.
         steps: the caption of each frame.
         start: the frame closest to the design position, which is shown first.
@@ -79,6 +82,7 @@ class Drawing(msgspec.Struct):
     tubes: list[Nodes] = []
     wheels: list[Wheel] = []
     arrows: list[tuple[int, Numbers, str, list[Numbers | None]]] = []
+    unit: str = "N"
     paths: list[int] = []
     steps: list[str] = []
     start: int = 0
@@ -107,6 +111,7 @@ class _Draughtsman:
         self.scene = scene
         self.bodies = [ground, *scene.bodies]
         self.numbers = {body.name: k for k, body in enumerate(self.bodies)}
+        self.kinds = [*dict.fromkeys(_kind(body) for body in self.bodies if not body.fixed)]
         self.drawn = Drawing()
         for joint in scene.joints:
             self._joint(joint)
@@ -244,7 +249,9 @@ class _Draughtsman:
             self._link(number, mine)
         frame = self._frame([vec(place) for other, *place in self.drawn.nodes if other == number])
         r, p = body.r or [body.origin], body.p or [body.euler_parameters]
-        return {"name": body.name, "fixed": body.fixed, "frame": frame, "r": r, "p": p}
+        colour = 0 if body.fixed else self.kinds.index(_kind(body)) % len(COLOURS)
+        facts = {"name": body.name, "fixed": body.fixed, "colour": colour}
+        return {**facts, "frame": frame, "r": r, "p": p}
 
     def _link(self, number: int, nodes: Sequence[int]) -> None:
         if len(nodes) <= ALL_JOINED:
@@ -262,6 +269,11 @@ class _Draughtsman:
         middle = _middle(hardpoints)
         reach = max(math.dist([*point], middle) for point in hardpoints)
         return [0.0, 0.0, 0.0] if math.hypot(*middle) <= reach + SAME else [*middle]
+
+
+def _kind(body: SceneBody) -> str:
+    """Return the name of a body without the side of an axle."""
+    return body.name.removeprefix("left_").removeprefix("right_")
 
 
 def _sum(forces: Sequence[SceneForce], values: Sequence[float | None]) -> Numbers | None:

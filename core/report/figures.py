@@ -44,21 +44,24 @@ SYMBOLS = (
 
 @dataclass(frozen=True)
 class Style:
-    """Style of an engine, the same in every figure of a page."""
+    """Style of an engine, the same in every figure of a page.
+
+    Attributes:
+        measured: whether its values are a recording's, which are points without a line.
+    """
 
     key: str
     name: str
     colour: str
     dash: str
     symbol: str
+    measured: bool = False
 
     @classmethod
-    def number(cls, index: int, name: str) -> Style:
+    def number(cls, index: int, name: str, *, measured: bool = False) -> Style:
         """Return the style of the index-th engine."""
-        k = index % len(COLOURS)
-        return cls(
-            f"s{k}", name, COLOURS[k], DASHES[index % len(DASHES)], SYMBOLS[index % len(SYMBOLS)]
-        )
+        k, dash, symbol = (index % len(each) for each in (COLOURS, DASHES, SYMBOLS))
+        return cls(f"s{k}", name, COLOURS[k], DASHES[dash], SYMBOLS[symbol], measured)
 
     def curve(
         self, x: Any, y: Sequence[float | None], *, width: float = 1.8, size: int = 8
@@ -122,6 +125,8 @@ def output_figure(
     curves: Sequence[tuple[Style, OutputSeries]],
     truth: OutputSeries | None,
     band: tuple[OutputSeries, float] | None,
+    *,
+    measured: bool = False,
 ) -> Figure:
     """Return all engines' positions against the driver, over the reference.
 
@@ -129,6 +134,7 @@ def output_figure(
         curves: the engines and their outputs; at least one.
         truth: values of the reference.
         band: the values compared with, and the tolerance; drawn if it is wide enough to be seen.
+        measured: whether the reference consists of points, without a line between them.
     """
     unit, scale = DISPLAY.get(curves[0][1].unit, (curves[0][1].unit, 1.0))
     drawn = OverDriver(axis)
@@ -138,28 +144,43 @@ def output_figure(
             [None if v is None else v + off for v in standard] for off in (-tolerance, tolerance)
         )
         drawn.add_band(low, high, uid="band", fillcolor="rgba(128,128,128,0.18)", meta=REFERENCE)
-    if truth is not None:
+    known = [] if truth is None else drawn_values(truth.position, axis.kept, scale)
+    of_truth: Figure = {"name": REFERENCE, "uid": REFERENCE, "meta": REFERENCE}
+    if known and not measured:
         line: Figure = {"width": 6, "color": "rgba(128,128,128,0.45)"}
-        named = {"name": REFERENCE, "uid": REFERENCE, "meta": REFERENCE}
-        drawn.add(drawn_values(truth.position, axis.kept, scale), line=line, **named)
+        drawn.add(known, line=line, **of_truth)
     for index, (style, series) in enumerate(curves):
         values = drawn_values(series.position, axis.kept, scale)
+        named = {"name": style.name, "uid": style.key, "meta": style.name}
+        if style.measured:
+            drawn.add(values, mode="markers", marker=_marker(style.symbol, style.colour), **named)
+            continue
         line = {"width": 2, "color": style.colour, "dash": style.dash}
-        drawn.add(values, line=line, name=style.name, uid=style.key, meta=style.name)
+        drawn.add(values, line=line, **named)
         stride = max(len(curves), len(values) // MARKERS)
         some = slice(index * stride // len(curves), None, stride)
-        look = _marks(f"{style.key}-markers", style.name, 9, style.symbol, style.colour, 1.8)
+        look = _marks(f"{style.key}-markers", style.name, style.symbol, style.colour)
         drawn.add(values[some], axis.shown[: len(values)][some], **look)
+    if known and measured:
+        drawn.add(known, mode="markers", marker=MEASURED, **of_truth)
     value_axis: Figure = {"hoverformat": ".9g", "zeroline": True}
     if band is not None:
         value_axis |= _flat_range([series.position for _, series in curves], *band, scale)
     return drawn.figure(with_unit(output_label(output), unit), **value_axis)
 
 
-def _marks(uid: str, meta: str, size: int, symbol: str, colour: str, width: float) -> Figure:
+def _marks(uid: str, meta: str, *look: Any) -> Figure:
     """Return the look of marks without a line, which have no values at the pointer."""
-    marker = {"size": size, "symbol": symbol, "color": colour, "line": {"width": width}}
+    marker = _marker(*look)
     return {"mode": "markers", "marker": marker, "hoverinfo": "skip", "uid": uid, "meta": meta}
+
+
+def _marker(symbol: str, colour: str, size: int = 9, width: float = 1.8) -> Figure:
+    return {"size": size, "symbol": symbol, "color": colour, "line": {"width": width}}
+
+
+MEASURED = _marker("circle-open", "#7f7f7f", 4, 4)
+"""Marker of a measured point: a disc, above the curves."""
 
 
 def _flat_range(
@@ -238,7 +259,7 @@ def error_figure(
     worst = max((deviation for *_, deviation in curves), key=lambda deviation: deviation.max_abs)
     if worst.worst_step < len(axis.values) and 0 < worst.max_abs < math.inf:
         place = {"x": [axis.scale * axis.values[worst.worst_step]], "y": [factor * worst.max_abs]}
-        ring = _marks("worst", "worst", 15, "circle-open", "#7f7f7f", 2)
+        ring = _marks("worst", "worst", "circle-open", "#7f7f7f", 15, 2)
         traces.append({"type": "scatter", **place, **ring})
     tolerance = factor * worst.tolerance
     positive = [e for trace in traces for e in trace["y"] if e]

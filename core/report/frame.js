@@ -31,7 +31,8 @@ function frameOf(traces, layout, [width, height], view, font) {
   const columns = Math.max(2, Math.floor((right - left) / (slanted ? 40 : 72)));
   const x = scale("x", left, right, columns);
   const y = scale("y", bottom, top, rows);
-  return { left, right, top, bottom, width, height, x, y, sides, slanted, layout, floor, tops };
+  const edges = { left, right, top, bottom, width, height };
+  return { ...edges, x, y, sides, slanted, layout, floor, tops, font };
 }
 
 // The ends of stacked bars, by trace.
@@ -89,7 +90,7 @@ function longest(texts, font) {
   return texts.reduce((most, text) => Math.max(most, ruler.measureText(text).width), 0);
 }
 
-function grid({ left, right, top, bottom, width, height, x, y, sides, slanted }) {
+function grid({ left, right, top, bottom, height, x, y, sides, slanted, font }) {
   const made = [];
   const line = (side, at) => (at === 0 && side.zeroline !== false ? "zero" : "grid");
   const add = (name, attributes, ...texts) => made.push(svgElement(name, attributes, ...texts));
@@ -106,9 +107,12 @@ function grid({ left, right, top, bottom, width, height, x, y, sides, slanted })
     add("text", { x: left - 6, y: +place + 4, "text-anchor": "end" }, text);
   }
   const title = { class: "title", "text-anchor": "middle" };
-  const upwards = `translate(13 ${(top + bottom) / 2})rotate(-90)`;
+  const wide = longest([titleOf(sides.y)], font);
+  const isLong = wide > bottom - top; // it stands over the whole height, in smaller letters
+  const upwards = `translate(13 ${isLong ? height / 2 : (top + bottom) / 2})rotate(-90)`;
+  const size = wide > height - 8 ? `font-size: ${(12 * (height - 8)) / wide}px` : "";
   add("text", { ...title, x: (left + right) / 2, y: height - 6 }, titleOf(sides.x));
-  add("text", { ...title, transform: upwards }, titleOf(sides.y));
+  add("text", { ...title, transform: upwards, style: size }, titleOf(sides.y));
   return made;
 }
 

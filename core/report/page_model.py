@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from ..case.case import Truth
-from ..harness.engine import STANDARD
+from ..harness.engine import RECORDED, STANDARD
 from ..harness.labels import (
     against,
     displayed,
@@ -133,6 +133,8 @@ class CaseView:
     """One case of the page.
 
     Attributes:
+        source: the file or the origin of its numbers, and the convention of signs.
+        log: how the file was read; empty if `source` has all.
         evidence: evidence on the reference; None without a reference.
         worst: the deviation closest to its tolerance, or farthest beyond it.
         account: the degrees of freedom, as counted in the paper and by rank.
@@ -146,6 +148,7 @@ class CaseView:
     anchor: str
     truth: Truth
     source: str
+    log: str
     records: list[Record]
     evidence: Evidence | None
     axis: Axis
@@ -179,7 +182,11 @@ class Material:
         """The styles of the engines, those without any record last."""
         never = sorted({product(engine, mode) for _, engine, mode in self.results.missing})
         names = dict.fromkeys([*map(engine_name, self.results.records), *never])
-        return {name: Style.number(index, name) for index, name in enumerate(names)}
+        recorded = {engine_name(each) for each in self.results.records if each.mode == RECORDED}
+        return {
+            name: Style.number(index, name, measured=name in recorded)
+            for index, name in enumerate(names)
+        }
 
 
 def case_view(given: Material, name: str, anchor: str) -> CaseView:
@@ -194,11 +201,14 @@ def case_view(given: Material, name: str, anchor: str) -> CaseView:
     for index, output in enumerate(names):
         here = [each for each in deviations if each.output == output]
         outputs.append(_output(given, output, f"{anchor}-{index}", here, records, axis))
+    source = facts.get("source", "")
+    brief, more, _ = source.partition(";")
     return CaseView(
         name=name,
         anchor=anchor,
         truth=Truth(records[0].truth),
-        source=" · ".join(filter(None, (facts.get("source", ""), facts.get("signs", "")))),
+        source=" · ".join(filter(None, (brief, facts.get("signs", "")))),
+        log=source if more else "",
         records=records,
         evidence=next((record.evidence for record in records if record.evidence), None),
         axis=axis,
@@ -257,7 +267,8 @@ def _output(
     positions = [each for each in deviations if each.motion == "position"]
     standard = _standard(positions, records, references)
     band = (standard, positions[0].deviation.tolerance) if standard else None
-    given.figures[key] = output_figure(output, axis, curves, truth, band)
+    points = records[0].truth == Truth.THIRD_PARTY_DATA
+    given.figures[key] = output_figure(output, axis, curves, truth, band, measured=points)
     sentences = [
         f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)
     ]

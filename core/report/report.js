@@ -2,7 +2,7 @@
 // The page: its packed data, the drawing of its figures, and the actions of its buttons.
 
 const MARGIN = 600; // of the view, within which figures are drawn [px]
-const PAPER = [330, 270]; // size of a figure on paper [px]
+const PAPER = [340, 146]; // size of a figure on paper [px]
 
 function trouble(text) {
   Object.assign(document.getElementById("trouble"), { textContent: text, hidden: false });

@@ -17,6 +17,7 @@ const BESIDE = [
   [0, 18],
 ];
 
+const CROWDED = 0.3; // share of the names that others push aside
 const BAR = 0.0085; // radius of a bar in sizes of the mechanism
 // Half a tyre's section, and a hub: distances along the axis of rotation and from it in radii. No
 // file states a width: this is that of an ordinary tyre, two thirds of its radius.
@@ -38,7 +39,7 @@ const HUB = [
 ];
 
 // Draw a mechanism into its box at a sample, seen by a camera, with the layers that its boxes to
-// tick ask for, or else the given ones.
+// tick ask for, or else the given ones. Returns whether the names keep clear of each other.
 //   pen, size: of another surface than the canvas of the box.
 function paint(box, drawing, motion, bounds, { frame, layers = [], pen, size, ...look }) {
   const canvas = box.querySelector("canvas");
@@ -47,7 +48,7 @@ function paint(box, drawing, motion, bounds, { frame, layers = [], pen, size, ..
   const style = getComputedStyle(box);
   const colour = (name) => style.getPropertyValue(`--${name}`).trim();
   const isFixed = (b) => drawing.bodies[b].fixed;
-  const own = (b) => colour(isFixed(b) ? "axis" : `s${motion.moving.indexOf(b) % 6}`);
+  const own = (b) => colour(isFixed(b) ? "axis" : `s${drawing.bodies[b].colour}`);
   const ticked = (layer) => (box.querySelector(`[data-layer=${layer}]`) || {}).checked;
   const isOn = (layer) => layers.includes(layer) || ticked(layer);
   const surface = pen || cleared(canvas, width, height);
@@ -90,7 +91,7 @@ function paint(box, drawing, motion, bounds, { frame, layers = [], pen, size, ..
   if (isOn("frames")) motion.moving.forEach((b) => paintFrame(picture, b));
   paintAxes(picture, [30, height - 30]);
   forces.forEach((force) => writeForce(picture, force));
-  if (isOn("names")) writeNames(picture);
+  return !isOn("names") || writeNames(picture);
 }
 
 function paintRoad({ line, area, seen, colour }, corners) {
@@ -238,7 +239,7 @@ function paintForce({ line, seen, colour }, { from, to }) {
 }
 
 function writeForce({ seen, colour, write }, { name, to, size }) {
-  write(seen(to), `${name} ${shown(size, ".3g")} N`, colour("force"), BESIDE);
+  write(seen(to), `${name} ${size}`, colour("force"), BESIDE);
 }
 
 // The axes of a body's frame; their names where few bodies move.
@@ -266,13 +267,16 @@ function paintAxes({ line, turn, scale, colour, write }, [x, y]) {
 }
 
 function writeNames({ drawing, motion, spots, colour, own, write }) {
+  let moved = 0;
   const mean = (some) =>
     [0, 1].map((k) => some.reduce((total, at) => total + at[k], 0) / some.length);
   for (const [a, b, text] of drawing.labels) {
-    write(mean([spots[a], spots[b]]), text, colour("ink"), ABOVE_BELOW);
+    moved += !write(mean([spots[a], spots[b]]), text, colour("ink"), ABOVE_BELOW);
   }
   for (const b of motion.moving) {
     const mine = spots.filter((_, k) => drawing.nodes[k][0] === b);
-    if (mine.length) write(mean(mine), drawing.bodies[b].name, own(b), ABOVE_BELOW, "italic");
+    if (!mine.length) continue;
+    moved += !write(mean(mine), drawing.bodies[b].name, own(b), ABOVE_BELOW, "italic");
   }
+  return moved <= CROWDED * (drawing.labels.length + motion.moving.length);
 }

@@ -170,6 +170,7 @@ class Report:
 
     Attributes:
         name: also of its files.
+        verdict: the conclusion in a phrase behind the headline, where the page has none.
         linked: whether the page begins with links to its sections.
     """
 
@@ -178,6 +179,7 @@ class Report:
     facts: Sequence[str]
     sections: Sequence[Section]
     linked: bool = False
+    verdict: str = ""
 
 
 def deliver(

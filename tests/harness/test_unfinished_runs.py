@@ -230,7 +230,7 @@ def test_unwritable_history_is_read_whole(path, merged):
 
 def test_report_of_empty_history(path):
     Store(path).close()
-    with pytest.raises(KincheckError, match="no run to report; `kincheck run --history"):
+    with pytest.raises(KincheckError, match=r"no run to report\. `kincheck run --history"):
         reported(path)
 
 

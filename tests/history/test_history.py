@@ -319,7 +319,7 @@ def test_report_compares_files_without_history(tmp_path, capsys, monkeypatch):
     before, now = str(tmp_path / "before.json"), str(tmp_path / "now.json")
     assert main(["report", now, "--against", before]) == 1
     assert (
-        "10 → 20 ms a sweep (×2; by the spread from run to run, ×1.75 may be chance)"
+        "10 → 20 ms a sweep (×2: by the spread from run to run, ×1.75 may be chance)"
         in capsys.readouterr().out
     )
     assert main(["report", before, "--against", now]) == 0

@@ -105,7 +105,7 @@ def test_calibrated_times_on_changed_processor(path):
 
 PLANTED = {
     "error": (worse(20.0), Kind.DRIFTED, "x position error 5e-13 → 1e-11 m (×20, tolerance 1e-9)"),
-    "time": (times(2.0), Kind.SLOWER, " → 20 ms a sweep (×2; by the spread"),
+    "time": (times(2.0), Kind.SLOWER, " → 20 ms a sweep (×2: by the spread"),
     "phase": (
         {
             "outcome": Outcome.ERROR,

@@ -293,7 +293,7 @@ def test_foreign_database_is_unchanged(path):
 def test_empty_history_file_stays_empty(path, command, capsys):
     path.touch()
     assert main([command, "--history", str(path)]) == 2
-    assert "it is empty; `kincheck run --history FILE` stores runs" in capsys.readouterr().err
+    assert "it is empty. `kincheck run --history FILE` stores runs" in capsys.readouterr().err
     assert not path.read_bytes()
 
 

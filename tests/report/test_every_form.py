@@ -15,6 +15,7 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.compare import designs
+from kincheck.core.extensions.compliance import page as compliance_page
 from kincheck.core.extensions.compliance import study
 from kincheck.core.extensions.compliance import views as compliance_views
 from kincheck.core.extensions.explain.text import print_diagnosis
@@ -197,7 +198,7 @@ def test_kc_reaches_every_form(tmp_path):
     forms = {
         "terminal": lambda result: "\n".join(compliance_views.lines(result)),
         "json": lambda result: json.dumps(compliance_views.as_data(result)),
-        "page": lambda result: text_of_page(compliance_views.page(result)),
+        "page": lambda result: text_of_page(compliance_page.page(result)),
         "csv": compliance_views.table,
     }
     lacking = missing(found, forms, [*found.travel.outputs], r"(?!cases\.).*")

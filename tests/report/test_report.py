@@ -181,3 +181,15 @@ def test_page_folds_long_messages(message, head, tmp_path):
     assert head.strip() in text
     assert rest.strip() in text
     assert "…" not in text[: text.index("Overview")].replace("0…20", "")
+
+
+def test_page_ends_with_reading(tmp_path):
+    """How a file was read comes last; the top names the file."""
+    run = results()
+    facts = run.run["cases"]["strut"] | {"source": "CSV of a.csv, y left; left out: column c"}
+    page = report(replace(run, run=run.run | {"cases": {"strut": facts}}), tmp_path)
+    head, _, end = page.words.partition("How files were read")
+    assert "CSV of a.csv, y left · 21 samples" in head
+    assert "column c" not in head + "Reference of strut"
+    assert "CSV of a.csv, y left; left out: column c." in end
+    assert 64 * "a" in end

@@ -4,6 +4,8 @@ and keyboard.
 
 from __future__ import annotations
 
+import base64
+import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -13,6 +15,7 @@ from kincheck import cases
 from kincheck.core.harness.record import Outcome, Results
 from kincheck.core.harness.scene import scene
 from kincheck.core.report.figures import Effort, Past
+from kincheck.core.report.report import write_report
 from msgspec.structs import replace as replaced
 
 from ..support.strut_results import GRID, distances, record, results, series
@@ -284,3 +287,25 @@ def test_eight_engines_fit_narrow_page(visit):
         """,
     )
     assert told["whole"] <= told["seen"]
+
+
+@pytest.mark.nightly
+def test_printed_pages_are_full(browser, tmp_path):
+    """Five outputs with their differences on each page, the rest on four more."""
+    run = results()
+    names = [f"output_{k}" for k in range(30)]
+    records = [
+        replaced(
+            each,
+            outputs=dict.fromkeys(names, each.outputs["half_track_change"]),
+            errors=dict.fromkeys(names, each.errors["half_track_change"]),
+        )
+        for each in run.records[:2]
+    ]
+    known = dict.fromkeys(names, series(GRID))
+    write_report(
+        replaced(run, records=records, references={"strut": known}), file := tmp_path / "a.html"
+    )
+    browser.visit(file.as_uri())
+    printed = base64.b64decode(browser("Page.printToPDF", preferCSSPageSize=True)["data"])
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) <= 30 / 5 + 4

@@ -234,3 +234,20 @@ def test_round_off_is_drawn_within_tolerance(tmp_path):
     assert figures["case-0-0"]["layout"]["xaxis"]["range"] == pytest.approx([-2e-6, 2e-6])
     moving = report(results(), tmp_path).data["figures"]["case-0-0"]["layout"]
     assert "range" not in moving["xaxis"]
+
+
+def test_measured_values_are_points(tmp_path):
+    """Third-party data are discs above the curves, a recording's values marks without a line."""
+    run = results("third_party_data")
+    recorded = [replace(each, mode="recorded") for each in run.records[1:2]]
+    run = replace(run, records=[run.records[0], *recorded])
+    page = report(run, tmp_path)
+    figure = page.data["figures"]["case-0-0"]["data"]
+    assert figure[-1]["meta"] == "reference"
+    expected = [1000 * v for v in series(GRID).position if v is not None]
+    for name in ("reference", "one · recorded"):
+        [points] = traces(page, "case-0-0", name, "markers")
+        assert len(points["x"]) == len(GRID)
+        assert not traces(page, "case-0-0", name, "lines")
+    assert figure[-1]["x"] == pytest.approx(expected, rel=1e-9)
+    assert traces(page, "case-0-0", "native", "lines")

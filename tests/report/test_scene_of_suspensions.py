@@ -147,3 +147,12 @@ def test_steered_sweep_has_no_centre(tmp_path, axle, rack, middle):
     assert [len(wheel.middle) for wheel in scene(case, poses=False).wheels] == [middle] * (
         1 if axle is None else 2
     )
+
+
+def test_scene_mirrored_bodies_share_colours(tmp_path):
+    (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["double_wishbone"]), "utf-8")
+    drawn = drawing(scene(load(tmp_path / "car.csv", Supplied(axle="heave")), poses=False), AXIS)
+    colours = {each["name"]: each["colour"] for each in drawn.bodies if not each["fixed"]}
+    kinds = [colours[f"left_{name}"] for name in ("uca", "lca", "knuckle")]
+    assert [colours[f"right_{name}"] for name in ("uca", "lca", "knuckle")] == kinds
+    assert len({*kinds}) == 3

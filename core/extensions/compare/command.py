@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...case.io.reader_options import Supplied
+from ...cli.forms import contents_of_forms, with_forms
 from ...cli.parser import Command
 from ...cli.registry import Registry, Status, tell_left_out
 from ...cli.shared_options import TOL
@@ -28,11 +29,12 @@ if TYPE_CHECKING:
 
 PAGE = ("compare.json", "compare.html")
 """File names in the folder of --out."""
+_Formed: Any = with_forms()
 WIDE = "write a column for each output, design and difference"
 
 
 @options
-class Compare(Command):
+class Compare(_Formed, Command):  # pyright: ignore[reportUntypedBaseClass]
     """Compare designs of a suspension: which hardpoints differ, and by how much toe, camber, roll
     centre and the other outputs do, at rebound, design, jounce and where they differ most.
 
@@ -108,14 +110,18 @@ class Compare(Command):
         columns = views.side_by_side(designs)
         rows = [*zip(*columns.values(), strict=True)]
         kinds = dict.fromkeys(columns, Kind.NUMBER)
+        report = views.comparison(designs, beyond)
         deliver(
-            views.comparison(designs, beyond),
+            report,
             views.with_comparison(designs, beyond),
             out=self.out,
             json=self.json,
             files=[
-                (file, lambda path, kind=kind: WRITERS[kind](path, kinds, [rows]))
-                for kind, file in curves_of(self).items()
+                *(
+                    (file, lambda path, kind=kind: WRITERS[kind](path, kinds, [rows]))
+                    for kind, file in curves_of(self).items()
+                ),
+                *contents_of_forms(self, report),
             ],
             problems=unsolved,
         )
@@ -170,7 +176,7 @@ def _tolerances_of(texts: Sequence[str], file: Path, designs: Designs) -> dict[s
     """Return accepted differences by output, in the units of the first design."""
     from ...case.io.document import unknown_name
     from ...case.io.reference_curve import size_of
-    from ...harness.labels import in_table_units
+    from ...harness.table_units import in_table_units
 
     units = {name: each.unit for name, each in designs.results.records[0].outputs.items()}
     found: dict[str, float] = {}

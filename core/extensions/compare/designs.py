@@ -5,6 +5,7 @@ All numbers are in the units of the first design's table, and differences are fr
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,9 +15,10 @@ import numpy as np
 from ...case.case import MARKER, PER_TRAVEL, Case
 from ...case.units import LENGTHS
 from ...dataset import Dataset, Variable
-from ...harness.labels import in_table_units, shorten_names
 from ...harness.labels import notes as notes_of
+from ...harness.labels import shorten_names
 from ...harness.record import Facts, Results
+from ...harness.table_units import in_table_units
 from ...joints import Kind
 from ...kinematics import kinds, places
 from ...report.axis import ZERO, driver_axis, events, number
@@ -31,6 +33,8 @@ from ...unit_text import with_unit
 SAME = 1e-9
 """Distance below which points are the same [m]: a table has no such digit, and conversions of units
 round far below."""
+FINEST = 6
+"""Decimals of the smallest outputs."""
 WITHOUT_LENGTH = (Kind.DIRECTION, Kind.DIRECTIONS, Kind.NUMBER)
 
 
@@ -189,7 +193,23 @@ def comparison(designs: Designs, beyond: Sequence[str]) -> Report:
     first, *others = (case.name for case in designs.cases)
     signs = dict.fromkeys(case.signs for case in designs.cases if case.signs)
     sections = [_of_outputs(designs, beyond), _of_points(designs.cases), _of_curves(designs)]
-    return Report("compare", f"{', '.join(others)} against {first}", [*signs], sections)
+    name = f"{', '.join(others)} against {first}"
+    return Report("compare", name, [*signs], sections, verdict=_verdict(designs, beyond))
+
+
+def _verdict(designs: Designs, beyond: Sequence[str]) -> str:
+    """Return the first difference beyond what the user accepts, or of the first output that
+    differs.
+    """
+    if beyond:
+        return " ".join(
+            [beyond[0], f"{len(beyond) - 1} more differ too much."] if beyond[1:] else beyond
+        )
+    for name, label, apart, k in designs.differences():
+        if abs(apart[k]) >= ZERO:
+            largest = f"{_signed_number(apart[k])} {designs.units[name]}".rstrip()
+            return f"{name} of {label} differs by at most {largest}, at {designs.at(k)}."
+    return "no output differs."
 
 
 def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
@@ -200,26 +220,34 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
     for name, label, apart, k in designs.differences():
         largest.setdefault(name, {})[label] = float(apart[k]), k
 
-    def cell(label: str, name: str, k: int) -> str:
-        value, base = (curves[each].get(name, {k: np.nan})[k] for each in (label, first))
-        apart = (
-            f" ({_signed_number(value - base)})" if label != first and np.isfinite(value) else ""
-        )
-        return number(value if np.isfinite(value) else None) + apart
+    def numbers(label: str, name: str, places: Sequence[int]) -> list[float]:
+        """Return the values at samples, each with its change from the first design."""
+        own, base = (curves[each].get(name) for each in (label, first))
+        found = list[float]()
+        for k in places:
+            value = np.nan if own is None else float(own[k])
+            change = np.nan if base is None or label == first else value - float(base[k])
+            found += [value, change]
+        return found
 
     rows: list[list[str]] = []
+    cells: list[list[str]] = []
     verdict = [*beyond]
     for name, found in largest.items():
         slope = name + PER_TRAVEL
         if "." in name or all(abs(each) < ZERO for each, _ in found.values()):
             continue
-        for label in (first, *found):
-            cells = [cell(label, name, k) for k in samples]
-            gradient = f"{cell(label, slope, design)} {designs.units.get(slope, '')}"
+        labels = (first, *found)
+        values = [numbers(each, name, samples) for each in labels]
+        slopes = [numbers(each, slope, [design]) for each in labels]
+        for label, *texts in zip(labels, _fixed(values), _fixed(slopes), strict=True):
             most, k = found.get(label, (0.0, 0))
-            at = ["", ""] if label == first else [_signed_number(most), designs.at(k)]
+            at = ["", ""] if label == first else [_signed_number(most, 2), designs.at(k)]
             title = with_unit(name, designs.units[name]) if label == first else ""
-            rows.append([title, label, *cells, gradient, *at])
+            rows.append([title, label])
+            cells.append([each for group in texts for each in group] + at)
+    columns = [*map(_aligned, zip(*cells, strict=True))]
+    rows = [row + [each[k] for each in columns] for k, row in enumerate(rows)]
     titles = [row[0].partition(" [")[0] for row in rows]
     if equal := [name for name in largest if "." not in name and name not in titles]:
         verdict.append(f"No difference: {', '.join(equal)}.")
@@ -231,14 +259,49 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
         for name, what in designs.other.items()
         if "." not in name
     ]
-    columns = ["output", "design", *heads, "gradient at design", "largest difference", "at"]
-    notes = [f"In brackets: the difference from {first}."] if rows else []
+    changes = [title for head in heads for title in (head, "change")]
+    ends = ["slope, per m", "change", "largest", "at"]
+    columns = ["output", "design", *changes, *ends]
+    notes = [f"Changes are from {first}. Slopes are at design, per m of travel."] if rows else []
     notes += [f"Note: {case}: {note}." for case, note in notes_of(designs.results.run)]
     return Section("Outputs", verdict, notes, columns, 2, rows)
 
 
-def _signed_number(value: float) -> str:
-    return f"{'+' if value > ZERO else ''}{number(value)}"
+def _fixed(rows: Sequence[Sequence[float]]) -> list[list[str]]:
+    """Return rows of pairs of a value and its change, all with the decimals that give the largest
+    value four digits; round-off and what has no such digit is 0.
+    """
+    size = max((abs(x) for row in rows for x in row[::2] if np.isfinite(x)), default=0.0)
+    decimals = max(0, 3 - int(np.floor(np.log10(size)))) if size > ZERO else 3
+    decimals = min(decimals, FINEST)
+
+    def text(value: float, sign: str) -> str:
+        if not np.isfinite(value):
+            return ""
+        if abs(value) <= max(ZERO, 0.5 * 0.1**decimals):
+            return "0"
+        return f"{value:{sign}.{decimals}f}".replace("-", "\N{MINUS SIGN}")
+
+    return [[text(x, "+" if k % 2 else "") for k, x in enumerate(row)] for row in rows]
+
+
+def _aligned(cells: Sequence[str]) -> list[str]:
+    """Return the cells of a column with spaces of the width of a point and of digits at their ends,
+    so that they stand under each other at the decimal.
+    """
+    numbers = [bool(re.fullmatch(r"[+\u2212]?\d+(\.\d*)?", each)) for each in cells]
+    ends = [len(each.partition(".")[2]) for each in cells]
+    longest = max((n for n, number in zip(ends, numbers, strict=True) if number), default=0)
+    return [
+        each + "\N{PUNCTUATION SPACE}" * ("." not in each) + "\N{FIGURE SPACE}" * (longest - n)
+        if number and longest
+        else each
+        for each, n, number in zip(cells, ends, numbers, strict=True)
+    ]
+
+
+def _signed_number(value: float, digits: int = 4) -> str:
+    return f"{'+' if value > ZERO else ''}{number(float(f'{value:.{digits}g}'))}"
 
 
 def _of_points(cases: Sequence[Case]) -> Section:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...case.io.reader_options import Supplied
 from ...cli import shared_options
+from ...cli.forms import contents_of_forms, with_forms
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import TOL, Isolated
 from ...errors import KincheckError, labelled, refuse
@@ -31,9 +32,10 @@ if TYPE_CHECKING:
     from ...case.units import Unit
     from ...harness.engine import Engine
     from ...harness.record import Record, Results
-    from .study import ComplianceResults
+    from .results import ComplianceResults
 
 MOST, UNLESS_GIVEN = 100_000, "25"
+_Formed: Any = with_forms()
 
 
 @dataclass(frozen=True)
@@ -42,15 +44,15 @@ class FromDesign(Supplied):
 
     travel: str | None = option(
         "travel of the wheel from design, or of the steering with --axle steer: up and down,"
-        " default 60mm:25, as in kincheck run; or START:STOP:SAMPLES, positive up:"
-        " --travel=-40:60mm:21; in metres without a unit",
+        " default 60mm:25, as in kincheck run, or START:STOP:SAMPLES, positive up:"
+        " --travel=-40:60mm:21. In metres without a unit",
         metavar="LENGTH[:N]|A:B:N",
         heading=HARDPOINTS,
     )
 
 
 @options
-class MeasureCompliance(Isolated):
+class MeasureCompliance(Isolated, _Formed):  # pyright: ignore[reportUntypedBaseClass]
     """Find the equilibria of a suspension with springs, bushings and loads, and their compliance.
 
     Joints with bushings give way to them. --axle heave, roll or steer moves both wheels of an axle.
@@ -61,22 +63,31 @@ class MeasureCompliance(Isolated):
     """
 
     about = "kinematics and compliance: equilibria on bushings over travel and loads"
+    LAST = (*Isolated.LAST, *_Formed.LAST)
     case: str = argument(
         "name of a built-in case, or path to a case file or a hardpoint table", "CASE"
     )
     load: tuple[str, ...] = option(
         "curve over a load at design, as lateral=-3000:3000:31 [N, N m]: longitudinal, lateral,"
-        " braking or aligning; 25 samples unless given; one number is a load that acts over all"
-        " travel; may be repeated",
+        " braking or aligning, 25 samples unless given. One number is a load that acts over all"
+        " travel. May be repeated",
         metavar="NAME=A:B:N",
         several="repeated",
     )
     bushings: Path | None = option(
         "bushings of the joints, in SI: TOML, for a table of hardpoints by role,"
-        " [bushings.ROLE], as kincheck templates NAME --bushings prints; else tables"
+        " [bushings.ROLE], as kincheck templates NAME --bushings prints, else tables"
         " [joints.NAME.bushings.X] as in case files",
         Path,
         "FILE",
+    )
+    spring: tuple[str, ...] = option(
+        "spring between two points of the case, by the name of its motion ratio without _ratio, of"
+        ' an axle on both sides: --spring "spring: 35 N/mm", with its force at design'
+        ' "spring: 35 N/mm, 3 kN". "tire: 200 N/mm" is under the wheel, for the ride rate. May be'
+        " repeated",
+        metavar='"NAME: RATE"',
+        several="repeated",
     )
     engine: tuple[str, ...] = option(
         "check the equilibria by these engines: each finds them by its own kinematics, gravity"
@@ -88,34 +99,42 @@ class MeasureCompliance(Isolated):
         "store the records of native and of these engines in this file, as kincheck run does", Path
     )
     csv: Path | None = destination("write the curves, in mm, deg, N, kN", Path)
-    json: str | None = destination("write the results in SI; - for standard output")
+    json: str | None = destination("write the results in SI, - for standard output")
     out: Path | None = destination("write the page DIR/kc.html, and results.json", Path, "DIR")
     joint_type: tuple[str, ...] = joint_types()
     supplied: FromDesign = group(default_factory=FromDesign)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...case.io.atomic_files import write
-        from ...case.units import LENGTHS
+        from ...case.io.atomic_files import write, write_all
         from ...harness.engine import STANDARD
         from ...harness.record import to_json
         from ...report.progress import complain, missing_requirements
         from ...report.table import print_table
         from ...report.terminal import with_json
+        from ..hardpoints.design import FARTHEST, travel_samples
         from ..hardpoints.reader import is_table
         from . import study, views
+        from .page import page, report
+        from .springs import springs_in, with_springs
 
         problems = shared_options.contradictions(self)
         engines = self._engines(registry, problems)
         refuse(problems or shared_options.unreachable(self))
         typed, axle = self.supplied.travel, self.supplied.axle
-        travel = None if typed is None else _values("--travel", _both_ways(typed), LENGTHS)
         table = os.path.isfile(self.case) and is_table(Path(self.case), self.supplied)
+        travel = study.DEFAULT_TRAVEL
+        if typed is not None:
+            # the steering of a case file may turn, in rad
+            farthest = math.inf if axle == study.AxleMotion.STEER and not table else FARTHEST
+            file, count = Path(self.case), len(travel)
+            travel = travel_samples(file, typed, count, still=True, farthest=farthest)
+        springs = springs_in(self.spring)
         # the sweep of a table's case; one sample is none
-        swept = table and travel is not None and travel[0] != travel[-1]
+        swept = table and typed is not None and travel[0] != travel[-1]
         supplied = replace(
             self.supplied,
-            travel=f"{travel[0]}:{travel[-1]}:{len(travel)}" if travel and swept else None,
+            travel=f"{travel[0]}:{travel[-1]}:{len(travel)}" if swept else None,
             axle=axle if table else None,
             bushings=self.bushings if table else None,
         )
@@ -124,6 +143,7 @@ class MeasureCompliance(Isolated):
             from ...case.io.mechanism_sections import with_bushings
 
             case = with_bushings(case, self.bushings)
+        case = with_springs(case, springs)
         refuse(self.unwritable("kc.html", *(["results.json"] if engines else [])))
         loads = dict(map(_load, self.load))
         results = study.compliance(case, travel, loads, axle or study.AxleMotion.HEAVE)
@@ -137,7 +157,8 @@ class MeasureCompliance(Isolated):
         if self.out is not None:
             if checked is not None:
                 write("--out", self.out / "results.json", to_json(checked))
-            write("--out", self.out / "kc.html", views.page(results).encode())
+            write("--out", self.out / "kc.html", page(results).encode())
+        problems += write_all(contents_of_forms(self, report(results)))
         with with_json(views.as_data(results), self.json) as console:
             print(*views.lines(results), sep="\n", file=console.file)
             if checked is not None:
@@ -218,24 +239,6 @@ def _load(text: str) -> tuple[str, Any]:
     return name, found if ":" in values else found[0]
 
 
-def _both_ways(travel: str) -> str:
-    """Return LENGTH or LENGTH:SAMPLES, up and down as in kincheck run, as START:STOP:SAMPLES."""
-    length, *count = travel.split(":")
-    if not count and length.startswith("-"):
-        raise KincheckError(
-            f"--travel {travel}: expected a length such as 60mm, up and down, or"
-            f" START:STOP:SAMPLES; one sample is {travel}:{travel}:1"
-        )
-    if len(count) > 1 or length.startswith("-") or not all(map(str.isdecimal, count)):
-        return travel
-    if count and int(count[0]) < 2:
-        raise KincheckError(
-            f"--travel {travel}: found {count[0]} sample up and down, expected 2 or more, or"
-            " START:STOP:SAMPLES"
-        )
-    return ":".join([f"-{length}", length, *count])
-
-
 def _values(option: str, text: str, units: Mapping[str, Unit]) -> list[float]:
     """Return the samples A:B:N, or one number, in SI."""
     from ...case.io.document import interval
@@ -250,7 +253,7 @@ def _values(option: str, text: str, units: Mapping[str, Unit]) -> list[float]:
     if not all(map(math.isfinite, ends)) or not count.isdecimal() or not 1 <= int(count) <= MOST:
         raise KincheckError(
             f"{option} {text}: expected START:STOP:SAMPLES or START:STOP, numbers in"
-            f" {' or '.join(units)}, {bare} without a unit, and 1 to {MOST} samples; write"
+            f" {' or '.join(units)}, {bare} without a unit, and 1 to {MOST} samples. Write"
             f" -60{other}:60{other}:25"
         )
     start, stop, steps = ends[0], ends[-1], max(1, int(count) - 1)
@@ -263,6 +266,7 @@ def compliance(
     loads: Mapping[str, float | Sequence[float]] | None = None,
     axle: str = "heave",
     *,
+    springs: Mapping[str, float | tuple[float, float]] | None = None,
     engines: str | Engine | Sequence[str | Engine] = (),
     jobs: int | None = None,
 ) -> ComplianceResults:
@@ -275,6 +279,8 @@ def compliance(
         loads: values by load, "lateral", "longitudinal", "braking" or "aligning" [N, N m], each
             applied at design; one number acts over all travel.
         axle: motion of both wheels: "heave", "roll" or "steer".
+        springs: rate [N/m], or rate and force at design [N/m, N], by the name of a motion ratio
+            without "_ratio", such as "spring"; "tire" is under the wheel.
         engines: names or engines that find the equilibria by themselves; `checked` has their
             records, judged against native.
         jobs: number of worker processes, as of `run`.
@@ -286,8 +292,9 @@ def compliance(
     from ...cli.main import function, registry
     from ...cli.run import Run
     from . import study
+    from .springs import with_springs
 
-    one = registry().find_case(case, driven=False)
+    one = with_springs(registry().find_case(case, driven=False), springs or {})
     found = study.compliance(one, travel, loads, axle)
     if found.failures:
         raise KincheckError("\n".join(found.failures))

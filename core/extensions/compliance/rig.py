@@ -97,7 +97,7 @@ def held_drivers(case: Case, rig: Rig, soft: Mechanism) -> tuple[str, ...]:
     for name in rig.held or ():
         if name not in left:
             raise KincheckError(
-                f"{case.name}: driver {name!r} is held, and its joint gives way to bushings; leave"
+                f"{case.name}: driver {name!r} is held, and its joint gives way to bushings. Leave"
                 " it out of held, or drive another joint"
             )
     return rig.held if rig.held is not None else tuple(left)
@@ -146,7 +146,7 @@ def _wheel(
         on_wheel = [p for p in (*known, *driven) if rig.wheel in (None, p.body)]
         if not on_wheel:
             raise KincheckError(
-                f"{case.name}: no point is the wheel's centre; add [suspension], or a point"
+                f"{case.name}: no point is the wheel's centre. Add [suspension], or a point"
                 " 'wheel_center' of the wheel's carrier"
             )
         center = on_wheel[0]
@@ -159,7 +159,7 @@ def _wheel(
     ]
     if not travels:
         raise KincheckError(
-            f"{case.name}: no held driver lifts the wheel of {center.body!r}; add a driver of type"
+            f"{case.name}: no held driver lifts the wheel of {center.body!r}. Add a driver of type"
             f" point_coordinate at {center.name!r}, and name it in [compliance] held"
         )
     spin = (
@@ -201,6 +201,6 @@ def _contact(
         if each in points and not name:
             return points[each]
     raise KincheckError(
-        f"{case.name}: no point is where the wheel touches the road; give [compliance] contact ="
+        f"{case.name}: no point is where the wheel touches the road. Give [compliance] contact ="
         " POINT, or [suspension] wheel_radius"
     )

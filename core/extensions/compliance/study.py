@@ -13,7 +13,7 @@ Sources: the numbering and the factors are those of Adams/Car, Output of Suspens
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import Any
 
@@ -31,8 +31,7 @@ from ...case.quantity import (
     still_jets,
     with_markers,
 )
-from ...errors import KincheckError, SolveError, number_of
-from ...harness.record import Results
+from ...errors import KincheckError, SolveError
 from ...jet import Jet
 from ...kinematics import solve
 from ...mechanism.mechanism import Mechanism
@@ -41,21 +40,20 @@ from ...trajectory import Array, PointMotion
 from ..hardpoints.suspension import PerTravel
 from ..statics.equilibrium import Equilibria, StaticModel
 from .rates import SIDES, Curve, wheel_rates
+from .results import COMPLIANCE, LOAD, WHEEL_LOAD, ComplianceCurves, ComplianceResults
 from .rig import CONTACT, PER, Wheel, held_drivers, wheels_of
 from .section import Load, rig_of
+from .springs import how_to_add
 
 # Engines agree on equilibria to round-off of their positions, which stiffness turns into forces.
 WITHIN, SAME_LOAD, ROUND_OFF = 1e-12, 1e-9, 1e-15
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 GOAL = "engines differ by round-off"
 DEFAULT_TRAVEL = np.linspace(-0.06, 0.06, 25)
-MOST_SAID = 5
-"""Failures that messages name."""
-WHEEL_LOAD = "wheel_load"
-"""Name of the first curve, which a driver's effort in a case may have as well."""
-NOT_COMPUTED = "not computed: "
-"""Before the outputs without a curve, in notes."""
 NO_VALUE = "it has no value at any of these samples, by its definition"
+OF_A_WHEEL = {"wheel_rate", "wheel_rate_opposite"}
+SMALL_LOAD, SMALL_TRAVEL = 1e-9, 1e-3
+"""A wheel load of less is round-off [N], and travels are seldom shorter [m]."""
 
 
 class AxleMotion(StrEnum):
@@ -66,74 +64,6 @@ class AxleMotion(StrEnum):
     HEAVE = "heave"
     ROLL = "roll"
     STEER = "steer"
-
-
-@dataclass(frozen=True, eq=False)
-class ComplianceCurves:
-    """Results over travel, or over a load at design.
-
-    Attributes:
-        axis: name of the varied quantity: "travel", or a load.
-        at: its values [m, N or N m], shape (n,).
-        wheel_center, spin_axis: of the (left) wheel, global [m, -], shape (n, 3).
-        wheel_load: upward force to hold its centre's height [N], shape (n,).
-        compliance: C, shape (n, 6, 6) or (n, 12, 12).
-        outputs: outputs and their slopes by name.
-        rigid: outputs of the mechanism with joints in place of bushings, over travel.
-        not_computed: reasons by output of the case that has no curve.
-        failures: samples without equilibrium, and the last ones with it.
-        notes: facts for readers.
-        turning: whether the travel is an angle.
-    """
-
-    axis: str
-    at: Array
-    wheel_center: Array
-    spin_axis: Array
-    wheel_load: Array
-    compliance: Array
-    outputs: Mapping[str, Curve]
-    rigid: Mapping[str, Array]
-    not_computed: Mapping[str, str]
-    failures: tuple[str, ...]
-    notes: tuple[str, ...]
-    turning: bool = False
-
-    @property
-    def lost(self) -> list[str]:
-        """A line for each reason of outputs without a curve."""
-        names: dict[str, list[str]] = {}
-        for name, reason in self.not_computed.items():
-            names.setdefault(reason, []).append(name)
-        return [f"{NOT_COMPUTED}{', '.join(each)}: {why}" for why, each in names.items()]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ComplianceResults:
-    """Results of a study: over travel, and over each load at design by its name.
-
-    Attributes:
-        cases: the same equilibria for engines, in the same order.
-        checked: records of engines.
-    """
-
-    case: str
-    travel: ComplianceCurves
-    loads: Mapping[Load, ComplianceCurves] = field(default_factory=dict[Load, ComplianceCurves])
-    signs: str = ""
-    cases: tuple[Case, ...] = ()
-    checked: Results | None = None
-
-    def __repr__(self) -> str:
-        found = number_of(len(self.travel.at), "sample")
-        lost = f", {len(self.failures)} without equilibrium" if self.failures else ""
-        return f"<ComplianceResults: {self.case}, {found} of travel{lost}>"
-
-    @property
-    def failures(self) -> list[str]:
-        """All samples without equilibrium."""
-        every = (self.travel, *self.loads.values())
-        return [message for each in every for message in each.failures]
 
 
 def compliance(
@@ -166,11 +96,11 @@ def compliance(
     given = DEFAULT_TRAVEL if travel is None else np.asarray(travel, dtype=np.float64)
     for name in loads or {}:
         if name not in list(Load):
-            raise KincheckError(f"load {name!r} is none of {', '.join(Load)}; give one of these")
+            raise KincheckError(f"load {name!r} is none of {', '.join(Load)}. Give one of these")
     every = {Load(name): np.asarray(values, float) for name, values in (loads or {}).items()}
     always = {load: values for load, values in every.items() if not values.ndim}
-    curves = {load: study.over_load(load, values) for load, values in every.items() if values.ndim}
     over_travel = study.over_travel(given, always)
+    curves = {load: study.over_load(load, values) for load, values in every.items() if values.ndim}
     cases = [study.case_of("travel", given, always, over_travel)]
     cases += [study.case_of(x, curve.at, {x: curve.at}, curve) for x, curve in curves.items()]
     return ComplianceResults(case.name, over_travel, curves, study.signs, tuple(cases))
@@ -188,20 +118,30 @@ class _Study:
         self.wheels = wheels_of(case, held, soft)
         if len(self.wheels) == 1 and axle is not AxleMotion.HEAVE:
             raise KincheckError(
-                f"{case.name}: --axle {axle} needs both wheels of an axle, and the case has one;"
-                " add [suspension.other], or leave the option out"
+                f"{case.name}: --axle {axle} needs both wheels of an axle, and the case has one."
+                " Add [suspension.other], or leave the option out"
             )
         self.steering = _steering(case, held, self.wheels) if axle is AxleMotion.STEER else ""
         self.mechanism: Mechanism = replace(
             soft, drivers=[driver for driver in soft.drivers if driver.name in held]
         )
-        self.lacking = lacking(case, self.mechanism)
+        self.lacking, self.without_rate = lacking(case, self.mechanism), False
         self.computed = [x for x in case.outputs if x.name not in self.lacking]
         self.model = StaticModel(
             self.mechanism,
             [point for wheel in self.wheels for point in wheel.points],
             {name for output in self.computed for name in output.forces},
         )
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether anything moves under a load while the held drivers stand still."""
+        return self.model.equations.unknowns > len(self.model.equations.chosen)
+
+    @property
+    def _stiffest(self) -> float:
+        """The largest stiffness [N/m]."""
+        return max((x for each in self.mechanism.forces for x in _stiffnesses(each)), default=0.0)
 
     @property
     def signs(self) -> str:
@@ -234,7 +174,12 @@ class _Study:
             return " with ".join([f"{what} {share * x:.6g} {unit}", *under])
 
         curves = self._curves("travel", values, found, sample_text)
-        return replace(curves, rigid=self._rigid(values), turning=unit == "rad")
+        return replace(
+            curves,
+            rigid=self._rigid(values),
+            turning=unit == "rad",
+            upward=not self.steering,
+        )
 
     def case_of(
         self, axis: str, at: Array, loads: Mapping[Load, Array], found: ComplianceCurves
@@ -247,7 +192,6 @@ class _Study:
         given = self._loads({load: np.broadcast_to(x, (n,)) for load, x in loads.items()}, n)
         places = tuple(point for wheel in self.wheels for point in wheel.points)
         largest = max(np.nanmax(np.abs([found.wheel_load, *(x[:, 2] for x in given.values())])), 0)
-        stiff = max((x for each in self.mechanism.forces for x in _stiffnesses(each)), default=0.0)
         outputs: list[Quantity] = []
         for wheel in self.wheels:
             outputs += [
@@ -256,7 +200,9 @@ class _Study:
                 )
                 for name, axis in AXES.items()
             ]
-            load = SAME_LOAD * float(largest) + ROUND_OFF * stiff
+            if WHEEL_LOAD in found.not_computed:
+                continue
+            load = SAME_LOAD * float(largest) + ROUND_OFF * self._stiffest
             effort = DriverEffort(f"{wheel.name}wheel_load", load, 0.0, GOAL, driver=wheel.travel)
             outputs.append(effort.bound(self.mechanism))
         known = [x for x in self.case.outputs if not x.forces and x.orders == ORDERS]
@@ -300,16 +246,24 @@ class _Study:
         self, axis: str, at: Array, found: Equilibria, what: Callable[[float, float], str]
     ) -> ComplianceCurves:
         wheel, lost = self.wheels[0], ~found.reached
-        outputs, own = self._outputs(found), self._rates(found)
+        rates, contact = self._rates(found), self._at_contact(found)
+        outputs, own = self._outputs(found), {**rates, **contact}
         taken = {*own, WHEEL_LOAD}
         if any(x.name == WHEEL_LOAD and isinstance(x, DriverEffort) for x in self.computed):
             taken.remove(WHEEL_LOAD)
         if twice := sorted(outputs.keys() & taken):
             raise KincheckError(
-                f"{self.case.name}: output {twice[0]!r} has the name of a result of kincheck kc;"
-                " give it another name"
+                f"{self.case.name}: output {twice[0]!r} has the name of a result of kincheck kc."
+                " Give it another name"
             )
         outputs |= own
+        load = wheel.lift * found.efforts[wheel.travel]
+        reason = "no spring resists the wheel, so that it has no meaning. " + how_to_add(self.case)
+        idle = dict.fromkeys(self._unloaded(axis, at, load, rates), reason)
+        outputs = {name: each for name, each in outputs.items() if name not in idle}
+        if not self.gives_way:  # what the solver leaves is round-off
+            still = {x for x in outputs if x.endswith((*PER.values(),))} | {*contact}
+            outputs |= {x: replace(outputs[x], values=0.0 * at) for x in still}
         # a force or a quotient may have no value at all
         none = {
             name: NO_VALUE
@@ -322,7 +276,7 @@ class _Study:
             if isinstance(x, ForceMeasure)
             and (reason := self._placed(x, found).undetermined(found.forces))
         }
-        not_computed = {**self.lacking, **none, **shared}
+        not_computed = {**self.lacking, **none, **shared, **idle}
 
         def blank(values: Array) -> Array:
             return _blank_rows(values, lost)
@@ -338,11 +292,17 @@ class _Study:
             for x, way, ok in zip(at, found.unstable, found.reached, strict=True)
             if way and ok
         ]
-        notes = [f"{unstable[0]}; {len(unstable)} samples in all"] if unstable else []
+        notes = [f"{unstable[0]} ({len(unstable)} samples in all)"] if unstable else []
         if not self.mechanism.forces:
             notes.append(
                 "nothing is elastic: there is no bushing and no spring, so nothing gives way to a"
-                " load; give [joints.NAME.bushings.X], or --bushings FILE"
+                f" load. {how_to_add(self.case)}, and --bushings FILE, or"
+                " [joints.NAME.bushings.X]"
+            )
+        elif not self.case.mechanism.forces and not self.without_rate:
+            notes.append(
+                "wheel load and wheel rate are those of the bushings alone, as there is no spring."
+                f" {how_to_add(self.case)}"
             )
         if self.model.equations.dropped:
             notes.append(
@@ -354,13 +314,15 @@ class _Study:
             at,
             blank(found.place(wheel.body, wheel.center)),
             blank(found.direction(wheel.body, wheel.spin)),
-            blank(wheel.lift * found.efforts[wheel.travel]),
-            blank(self._matrix(found)),
+            blank(load * np.nan if WHEEL_LOAD in idle else load),
+            blank(self._matrix(found) * float(self.gives_way)),
             {name: replace(x, values=blank(x.values)) for name, x in outputs.items()},
             {},
             not_computed,
+            found.reached,
             tuple(failures),
             tuple(notes),
+            rigid_joints=not self.gives_way,
         )
 
     def _matrix(self, found: Equilibria) -> Array:
@@ -380,6 +342,36 @@ class _Study:
             ],
             axis=2,
         )
+
+    def _at_contact(self, found: Equilibria) -> dict[str, Curve]:
+        """Return the compliance of each wheel at the contact along its force, which acts on all."""
+        curves = dict[str, Curve]()
+        signed = [*zip(self.wheels, (1.0, self._other), strict=False)]
+        for load, k in ((Load.LATERAL, 1), (Load.LONGITUDINAL, 0)):
+            step: Any = sum(
+                sign * (found.by_load[f"{each.name}{CONTACT}"][0][:, :, :3] @ each.axes[k])
+                for each, sign in signed
+            )
+            sense = f"displacement of the contact along a {load} force at it"
+            for each, sign in signed:
+                moved = found.motion(step, each.body, each.contact)[:, :3] @ (sign * each.axes[k])
+                curves[f"{each.name}{load}_{COMPLIANCE}"] = Curve(moved, "m/N", sense)
+        return curves
+
+    def _unloaded(
+        self, axis: str, at: Array, load: Array, rates: Mapping[str, Curve]
+    ) -> tuple[str, ...]:
+        """Return the names of wheel load and rates that have no meaning: no spring resists."""
+        far = max(SMALL_TRAVEL, float(np.abs(at).max()) if axis == "travel" else 0.0)
+        small = SMALL_LOAD + WITHIN * self._stiffest * far
+        without_load = bool(np.abs(load).max() <= small)
+        if axis == "travel":
+            rate = max(float(np.abs(rates[name].values).max()) for name in OF_A_WHEEL & {*rates})
+            idle = without_load and rate <= small / far
+            self.without_rate = idle or not self.mechanism.forces
+        loads = [name for name in rates if name.startswith(WHEEL_LOAD)]
+        others = [name for name in rates if name not in loads]
+        return (*others * self.without_rate, *(WHEEL_LOAD, *loads) * without_load)
 
     def _step(self, found: Equilibria, load: Load) -> Array:
         """Return the motion of the unknowns by a unit of a load on all wheels."""
@@ -466,9 +458,7 @@ class _Study:
         rates = wheel_rates(matrix, track, self._other, self.rig.tire_stiffness)
         for side, wheel in zip(SIDES, wheels, strict=False) if len(wheels) == 2 else ():
             load = wheel.lift * found.efforts[wheel.travel]
-            rates[f"wheel_load_{side}"] = Curve(
-                load, "N", "upward force to hold its centre's height"
-            )
+            rates[f"{WHEEL_LOAD}_{side}"] = Curve(load, "N", LOAD)
         return rates
 
     def _rigid(self, values: Array) -> dict[str, Array]:
@@ -513,17 +503,17 @@ def lacking(case: Case, soft: Mechanism) -> dict[str, str]:
     for output in case.outputs:
         read = {*output.forces} - known
         if isinstance(output, PerTravel) and output.of_output.orders < ORDERS:
-            found[output.name] = "a slope of a slope; kincheck run has it for rigid joints"
+            found[output.name] = "a slope of a slope, which kincheck run has for rigid joints"
         elif isinstance(output, DriverEffort) and output.at is not None:
             found[output.name] = (
-                "an effort at another joint follows the motion of rigid joints; kincheck run has it"
+                "an effort at another joint follows the motion of rigid joints. kincheck run has it"
             )
         elif {*output.facts.get(HELD_BUT, ())} - held or read & drivers:
-            found[output.name] = "its driver is free here; name it in [compliance] held"
+            found[output.name] = "its driver is free here. Name it in [compliance] held"
         elif read:
             (name, *_) = read
             found[output.name] = (
-                f"joint {name!r} gives way to its bushings; give them as [forces.NAME], and ask for"
+                f"joint {name!r} gives way to its bushings. Give them as [forces.NAME], and ask for"
                 " their element_force"
             )
     return found
@@ -539,7 +529,7 @@ def _steering(case: Case, held: Sequence[str], wheels: Sequence[Wheel]) -> str:
     if not others:
         raise KincheckError(
             f"{case.name}: --axle steer needs a held driver of the steering, and all held drivers"
-            " lift wheels; add one to the case"
+            " lift wheels. Add one to the case"
         )
     return case.sweep.driver if case.sweep.driver in others else others[0]
 

@@ -1,4 +1,4 @@
-"""The results of a compliance study as JSON, as a table, and as a page."""
+"""The results of a compliance study as JSON, as a table, and as lines of the terminal."""
 
 from __future__ import annotations
 
@@ -6,23 +6,21 @@ import csv
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from ...errors import number_of
 from ...harness.record import Record, Results
-from ...report.axis import ZERO
-from ...report.figures import Figure, Style
-from ...report.page_model import ROUND_OFF, Plot
-from ...report.sections import Diagram, Report, Section
-from ...report.sections import page as render
+from ...report.axis import ENDLESS, ZERO
 from ...trajectory import Array
-from ...unit_text import with_unit
-from .rates import Curve
+from ...unit_text import unit_text, with_unit
+from .results import WHEEL_LOAD, ComplianceCurves, ComplianceResults
 from .section import Load
-from .study import MOST_SAID, WHEEL_LOAD, ComplianceCurves, ComplianceResults
 
+MOST_SAID = 5
+"""Failures that messages name."""
 SCHEMA = "kincheck-compliance/1"
 DEGREE = 180.0 / math.pi
 SHOWN: Mapping[str, tuple[str, float]] = {
@@ -42,9 +40,15 @@ SHOWN: Mapping[str, tuple[str, float]] = {
 """Unit and factor of tables and pages, by SI unit; files in JSON are in SI."""
 
 
-def _shown(unit: str) -> tuple[str, float]:
+def shown_unit(unit: str) -> tuple[str, float]:
     """Return unit and factor of tables and pages."""
     return SHOWN.get(unit, (unit, 1.0))
+
+
+def digits(value: float, count: int = 6) -> str:
+    """Return a number of the terminal or the summary; round-off is zero."""
+    whole = 10.0**count <= abs(value) < ENDLESS
+    return "0" if abs(value) < ZERO else f"{value:{'.0f' if whole else f'.{count}g'}}"
 
 
 def as_data(results: ComplianceResults) -> dict[str, Any]:
@@ -53,6 +57,7 @@ def as_data(results: ComplianceResults) -> dict[str, Any]:
         "schema": SCHEMA,
         "case": results.case,
         "signs": results.signs,
+        "summary": [asdict(each) for each in results.travel.summary()],
         **_data(results.travel),
         "loads": {str(name): _data(each) for name, each in results.loads.items()},
         "failures": results.failures,
@@ -119,7 +124,9 @@ def table(results: ComplianceResults) -> str:
     writer = csv.writer(text, lineterminator="\n")
     first = results.travel
     center = [f"wheel_center_{axis} [mm]" for axis in "xyz"]
-    names = {name: _shown(each.unit) for name, each in first.outputs.items() if name != WHEEL_LOAD}
+    names = {
+        name: shown_unit(each.unit) for name, each in first.outputs.items() if name != WHEEL_LOAD
+    }
     heads = [with_unit(name, unit) for name, (unit, _) in names.items()]
     heads += [with_unit(f"{name}.rigid", names[name][0]) for name in first.rigid]
     lost = (line for each in (first, *results.loads.values()) for line in each.lost)
@@ -152,13 +159,22 @@ def failures(results: ComplianceResults) -> list[str]:
     if not every:
         return []
     more = len(every) - MOST_SAID
-    rest = f"{number_of(more, 'further sample')} without equilibrium; " if more > 0 else ""
-    return [*every[:MOST_SAID], f"{rest}give less travel or load, or stiffer springs and bushings"]
+    rest = f"{number_of(more, 'further sample')} without equilibrium. " if more > 0 else ""
+    return [*every[:MOST_SAID], f"{rest}Give less travel or load, or stiffer springs and bushings"]
 
 
 def lines(results: ComplianceResults) -> Iterator[str]:
-    """Yield the slopes and rates at the sample nearest to design, and the ends of each curve."""
+    """Yield the numbers that engineers quote, and all slopes and rates at the sample nearest to
+    design with the ends of each curve.
+    """
     yield f"{results.case}: {results.signs}"
+    travel = results.travel
+    known = [each for each in travel.summary() if each.name not in travel.not_computed]
+    wide = max((len(each.label) for each in known), default=0)
+    for each in known:
+        shown, size = shown_unit(each.unit)
+        number = "" if each.value is None else digits(size * each.value, 4)
+        yield f"  {each.label:{wide}}  {number:>8} {unit_text(shown):16}  {each.says}".rstrip()
     every = (results.travel, *results.loads.values())
     for curves in every:
         yield from _lines(curves)
@@ -168,91 +184,18 @@ def lines(results: ComplianceResults) -> Iterator[str]:
 def _lines(curves: ComplianceCurves) -> Iterator[str]:
     """Yield the lines of curves over travel or over a load."""
     unit, factor = unit_of_axis(curves)
-    k = _near_design(curves)
-    if not math.isfinite(curves.wheel_load[k]):
+    k = curves.near_design
+    if not curves.reached.any():
         yield f"no equilibrium at any of {len(curves.at)} samples of {curves.axis}"
         return
     load = float(curves.wheel_load[k])
-    load = 0.0 if abs(load) < ZERO else load
-    yield f"at {curves.axis} {factor * curves.at[k]:.6g} {unit}, wheel load {load:.6g} N"
+    said = f", wheel load {digits(load)} N" if math.isfinite(load) else ""
+    yield f"at {curves.axis} {digits(factor * float(curves.at[k]))} {unit}{said}"
     for name, each in curves.outputs.items():
-        shown, size = _shown(each.unit)
+        shown, size = shown_unit(each.unit)
         if not np.isfinite(each.values).any():
             yield f"  {with_unit(name, shown)}  –"
             continue
-        shown_values = size * each.values
-        shown_values[abs(shown_values) < ZERO] = 0.0
-        low, high, value = np.nanmin(shown_values), np.nanmax(shown_values), shown_values[k]
-        yield f"  {with_unit(name, shown)}  {value:.6g}  (from {low:.6g} to {high:.6g})"
-
-
-def page(results: ComplianceResults) -> str:
-    """Return the page: curves over travel with the rigid ones beside, then over each load."""
-    every = (results.travel, *results.loads.values())
-    sections = [_section(number, curves) for number, curves in enumerate(every)]
-    if results.checked is not None:
-        sections.append(_agreement(results.checked))
-    k = _near_design(results.travel)
-    matrix = list[list[str]]()
-    if math.isfinite(results.travel.wheel_load[k]):
-        compliance = results.travel.compliance[k]
-        zero = ROUND_OFF * np.abs(compliance).max()
-        known = np.where(np.abs(compliance) > zero, compliance, 0.0)
-        matrix = [[f"{x:.4g}" for x in row] for row in known.tolist()]
-    note = (
-        "Rows: displacement [m] and turn [rad] at the contact; columns: force [N] and torque [N m]"
-        " there; global axes, six for each wheel."
-    )
-    sections.append(Section("Compliance at design", [], [note], [], 0, matrix))
-    facts = (
-        results.signs,
-        "equilibria with springs, bushings and weight",
-        "the height of the wheel's centre is held",
-        "point at a figure to read its values",
-    )
-    return render(Report("kc", f"Kinematics and compliance of {results.case}", facts, sections))
-
-
-def _section(number: int, curves: ComplianceCurves) -> Section:
-    """Return the diagrams over travel or over a load."""
-    soft, rigid = Style.number(0, "with bushings"), Style.number(1, "rigid joints")
-    styles = [soft, rigid] if curves.rigid else [soft]
-    unit, factor = unit_of_axis(curves)
-    x, diagrams = _drawn(factor * curves.at), list[Diagram]()
-    for name, each in {WHEEL_LOAD: Curve(curves.wheel_load, "N"), **curves.outputs}.items():
-        shown, size = _shown(each.unit)
-        data = [soft.curve(x, _drawn(size * each.values))]
-        if name in curves.rigid:
-            data.append(rigid.curve(x, _drawn(size * curves.rigid[name])))
-        figure: Figure = {
-            "data": data,
-            "layout": {
-                "xaxis": {"title": {"text": with_unit(curves.axis, unit)}, "zeroline": True},
-                "yaxis": {"title": {"text": with_unit(name, shown)}},
-                "hovermode": "x unified",
-            },
-        }
-        plot = Plot(f"curve-{number}-{len(diagrams)}", f"{name} over {curves.axis}", "")
-        diagrams.append(Diagram(plot, figure, styles))
-    title = f"Over {curves.axis}"
-    return Section(title, curves.failures, [*curves.notes, *curves.lost], [], 0, [], diagrams)
-
-
-def _agreement(checked: Results) -> Section:
-    rows = [
-        [x if isinstance(x, str) else "–" if x is None else f"{x:.1e}" for x in row.values()]
-        for row in agreement(checked)
-    ]
-    columns = ["case", "engine", "mode", "outcome", "message", "wheel centre [m]", "wheel load [N]"]
-    note = "The same equilibria by each engine; largest deviations from the native engine."
-    return Section("Agreement of engines", [], [note], columns, 5, rows)
-
-
-def _drawn(values: Array) -> list[float | None]:
-    return [float(f"{x:.10g}") if math.isfinite(x) else None for x in values.tolist()]
-
-
-def _near_design(curves: ComplianceCurves) -> int:
-    """Return the sample nearest to design, of those with an equilibrium if there are any."""
-    reached = np.isfinite(curves.wheel_load)
-    return int(np.argmin(np.where(reached, np.abs(curves.at), np.inf)))
+        ends = np.nanmin(each.values), np.nanmax(each.values), each.values[k]
+        low, high, value = (digits(size * float(x)) for x in ends)
+        yield f"  {with_unit(name, shown)}  {value}  (from {low} to {high})"

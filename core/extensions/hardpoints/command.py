@@ -26,7 +26,7 @@ class PrintTemplates(Command):
     """
 
     about = "print a sample table of hardpoints for each suspension template"
-    template: tuple[str, ...] = argument("print only these; default: all", "NAME", "*")
+    template: tuple[str, ...] = argument("print only these, by default all", "NAME", "*")
     bushings: bool = switch(
         "print a file of bushings by role, for kincheck kc TABLE --bushings FILE"
     )

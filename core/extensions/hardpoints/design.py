@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -29,7 +28,7 @@ from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ...mechanism.motions import Driver, JointDisplacement, Motion, PointCoordinate, Ramp, Table
 from ...trajectory import Array
 from .options import WheelOptions
-from .suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
+from .suspension import SWING_ARMS, Axle, Convention, Side, SuspensionOutput, Vehicle
 from .suspension.corner import MARKER_DISTANCE
 from .suspension.wheel import Place
 from .suspension_section import with_slopes
@@ -73,24 +72,11 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
     Raises:
         CaseError: an option is not a travel.
     """
-    wheel, samples = (-TRAVEL, TRAVEL), SAMPLES
+    wheel = np.linspace(-TRAVEL, TRAVEL, SAMPLES)
     if travel is not None:
-        parts = travel.split(":")
-        count = parts.pop() if len(parts) > 1 else str(SAMPLES)
-        ends = _interval(parts)
-        with suppress(ValueError):
-            samples = int(count)
-        if ends is None or ends[0] == ends[1] or not 1 < samples <= MOST_SAMPLES:
-            raise fault(
-                file,
-                "--travel",
-                f"found {shown(travel)}, expected a length such as 50mm, or LENGTH:SAMPLES, 2 to"
-                f" {MOST_SAMPLES} of them, or START:STOP:SAMPLES, up to {FARTHEST:g} m, in metres"
-                " unless a unit is given. Say --travel 50mm for 50 mm up and down",
-            )
-        wheel = ends
-    ends = None if rack is None else _interval(rack.split(":"))
-    if rack is not None and ends is None:
+        wheel = travel_samples(file, travel, SAMPLES)
+    ends = None if rack is None else _interval(rack.split(":"), FARTHEST)
+    if rack is not None and (ends is None or ends[0] == ends[1]):
         raise fault(
             file,
             "--rack",
@@ -98,18 +84,52 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
             f" {FARTHEST:g} m, in metres unless a unit is given. Say --rack 40mm for 40 mm to the"
             " right, then to the left",
         )
-    return Travels(np.linspace(*wheel, samples), ends)
+    return Travels(wheel, ends)
 
 
-def _interval(parts: Sequence[str]) -> tuple[float, float] | None:
+def travel_samples(
+    file: Path, text: str, count: int, *, still: bool = False, farthest: float = FARTHEST
+) -> Array:
+    """Return the samples of the option --travel: LENGTH:SAMPLES up and down, or
+    START:STOP:SAMPLES, in metres without a unit.
+
+    Args:
+        count: number of samples, unless the text says one.
+        still: whether one place is a travel too.
+        farthest: longest travel [m].
+
+    Raises:
+        CaseError: the text is no travel.
+    """
+    *parts, last = text.split(":")
+    counted = bool(parts) and last.strip().isdecimal()
+    ends = _interval(parts if counted else [*parts, last], farthest)
+    if counted and len(parts) == 1 and ends == (0.0, 0.0):
+        ends = None
+    place = ends is not None and ends[0] == ends[1]
+    samples = int(last) if counted else 1 if place else count
+    if ends is None or (place and not still) or not 2 - still <= samples <= MOST_SAMPLES:
+        limit = f", up to {farthest:g} m" if np.isfinite(farthest) else ""
+        raise fault(
+            file,
+            "--travel",
+            f"found {shown(text)}, expected a length such as 50mm, or LENGTH:SAMPLES, 2 to"
+            f" {MOST_SAMPLES} of them, or START:STOP:SAMPLES{limit}, in metres unless a unit"
+            f" ({', '.join(LENGTHS)}) is given. Say --travel 50mm for 50 mm up and down"
+            f"{', or --travel=20mm:20mm:1 for one place' * still}",
+        )
+    return np.linspace(*ends, samples)
+
+
+def _interval(parts: Sequence[str], farthest: float) -> tuple[float, float] | None:
     """Return the ends of LENGTH, which goes both ways, or of START:STOP; None for another text."""
     try:
         numbers, _ = interval(parts, LENGTHS, "m")
     except ValueError:
         return None
-    if len(numbers) == 1 and numbers[0] > 0.0:
-        numbers = [-numbers[0], numbers[0]]
-    if len(numbers) != 2 or not all(abs(each) <= FARTHEST for each in numbers):
+    if len(numbers) == 1 and numbers[0] >= 0.0:
+        numbers = [0.0 - numbers[0], numbers[0]]
+    if len(numbers) != 2 or not all(abs(each) <= farthest for each in numbers):
         return None
     return numbers[0], numbers[1]
 
@@ -340,6 +360,7 @@ def with_suspension_outputs(
     motion: str | None,
     *,
     steered: bool = False,
+    swing_arms: bool = False,
 ) -> Case:
     """Return the case with the suspension outputs, their slopes, and the coordinates of the
     template's watched points.
@@ -348,6 +369,7 @@ def with_suspension_outputs(
         vehicle: the vehicle around the wheel.
         motion: motion of both wheels; None for one wheel.
         steered: whether the rack moves during the wheel's travel.
+        swing_arms: whether instant centres and swing arms are among them.
     """
     extent, types = size(case), SuspensionOutput.registry
     outputs = list[Quantity]()
@@ -361,7 +383,7 @@ def with_suspension_outputs(
         vehicles = {f"{side}_": _on_side(vehicle, side) for side in Side}
     place = Place.WHEEL_CENTER if vehicle.wheel_radius is None else Place.CONTACT
     for prefix, wheel in vehicles.items():
-        for kind in _wheel_outputs(vehicle):
+        for kind in _wheel_outputs(vehicle, swing_arms=swing_arms):
             add(prefix + kind, kind, wheel)
         add(f"{prefix}half_track_change", "half_track_change", wheel, at=place)
         for name, ends in template.springs.items():
@@ -410,9 +432,12 @@ def _on_side(vehicle: Vehicle, side: Side) -> Vehicle:
     )
 
 
-def _wheel_outputs(vehicle: Vehicle) -> Iterator[str]:
+def _wheel_outputs(vehicle: Vehicle, *, swing_arms: bool) -> Iterator[str]:
     """Yield the types of the outputs of a wheel that the data of its vehicle define."""
     yield from ("toe", "camber")
+    for each in SWING_ARMS if swing_arms else ():
+        if vehicle.wheel_radius is not None or "wheel_radius" not in each.needs:
+            yield each.type
     if vehicle.kingpin:
         yield from ("caster", "kingpin_inclination")
     if vehicle.wheel_radius is None:

@@ -31,7 +31,7 @@ class HardpointOptions(ReaderOptions):
     }
 
     template: str | None = _option(
-        "type of suspension, if the file does not state it; kincheck templates prints them",
+        "type of suspension, if the file does not state it, as kincheck templates prints them",
         metavar="NAME",
     )
     units: str | None = _option(
@@ -44,16 +44,16 @@ class HardpointOptions(ReaderOptions):
         metavar="X,Y,Z",
     )
     travel: str | None = _option(
-        "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive"
-        " up: --travel=-40:120mm:33; in metres without a unit",
+        "travel of the wheel, up and down, default 50mm:41, or START:STOP:SAMPLES, positive"
+        " up: --travel=-40:120mm:33. In metres without a unit",
         metavar="M[:SAMPLES]",
     )
     side: str | None = _option(
-        "side of the wheel, left or right; without it, the side follows from the points",
+        "side of the wheel, left or right. Without it, the side follows from the points",
         metavar="SIDE",
     )
     names: Path | None = _option(  # noqa: RUF009
-        'names of the points in the file: TOML, with a line ROLE = "NAME" for each; a new FILE'
+        'names of the points in the file: TOML, with a line ROLE = "NAME" for each. A new FILE'
         " is written",
         Path,
         metavar="FILE",
@@ -82,11 +82,11 @@ class HardpointOptions(ReaderOptions):
     )
     rack: str | None = _option(
         "travel of the rack while the wheel goes up, such as 20mm, positive to the left: -M to"
-        " M, or START:STOP; in metres without a unit",
+        " M, or START:STOP. In metres without a unit",
         metavar="M",
     )
     position: str | None = _option(
-        "axle, front or rear, for anti-values; with --wheelbase, --cg-height and a share",
+        "axle, front or rear, for anti-values, with --wheelbase, --cg-height and a share",
         metavar="AXLE",
     )
     cg_height: str | None = _option(
@@ -100,6 +100,11 @@ class HardpointOptions(ReaderOptions):
     drive_share: str | None = _option(
         "share of the driving force at this axle, 0 to 1",
         metavar="X",
+    )
+    swing_arms: bool = switch(
+        "add the instant centres and swing arms in the views from the front and from the side to"
+        " the outputs: length, angle and coordinates",
+        heading=HARDPOINTS,
     )
     bushings: Path | None = None
 

@@ -134,7 +134,13 @@ def case_of_hardpoints(
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit.name, angle_unit="deg", assembly=(*told, *of_side))
     case = with_suspension_outputs(
-        case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
+        case,
+        template,
+        vehicle,
+        at,
+        supplied.axle,
+        steered=supplied.rack is not None,
+        swing_arms=supplied.swing_arms,
     )
     if followed:
         turned, unsteered = shims(template, at, vehicle.static_toe, vehicle.static_camber)

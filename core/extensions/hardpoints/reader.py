@@ -202,7 +202,7 @@ TABLE = HardpointReader(
     "hardpoint table",
     suffixes=(".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts"),
     unread={
-        ".pm": "is a suspension of rFactor, whose bars have no names of points; write their ends"
+        ".pm": "is a suspension of rFactor, whose bars have no names of points. Write their ends"
         " into a table, name,x,y,z, with --units m --axes left,up,rearward"
     },
     table=_plain,

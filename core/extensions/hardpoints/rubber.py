@@ -242,7 +242,9 @@ def sample_bushings(template: Template) -> str:
 
     It has the places on the chassis, but for the steered rod, which has often none.
     """
-    lines = [f"# bushings of template {template.name}: kincheck kc TABLE --bushings FILE; SI units"]
+    lines = [
+        f"# bushings of template {template.name}: kincheck kc TABLE --bushings FILE, in SI units"
+    ]
     lines.append("# one number serves all axes. The third is the joint's own axis, if it has one")
     for role in (*template.roles, *template.optional):
         if role.name not in template.sample:

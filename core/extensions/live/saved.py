@@ -12,13 +12,12 @@ import numpy as np
 from ...case.case import HELD_BUT, SLOW, TIME, Case, Sweep, without_forces
 from ...case.measures import JointForce
 from ...errors import KincheckError
-from ...harness.labels import in_table_units
 from ...harness.native_engine import NativeEngine
 from ...harness.provenance import case_facts
 from ...harness.run import run
+from ...harness.table_units import DRIVER_UNITS, in_table_units
 from ...kinematics import places
 from ...mechanism.motions import Ramp
-from ...report.axis import DRIVER_UNITS
 from ...report.progress import complain
 from ...studies.reactions import with_reactions
 from ...unit_text import with_unit

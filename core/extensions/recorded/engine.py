@@ -286,16 +286,16 @@ class ProgramEngine:
     untimed = True
 
     def __post_init__(self) -> None:
-        form = f'say {OPTION} "prog {{case}} {{samples}} {{out}}"'
+        form = f'Say {OPTION} "prog {{case}} {{samples}} {{out}}"'
         try:
             fields = {name for _, name, *_ in string.Formatter().parse(self.command) if name}
             words = shlex.split(self.command)
         except ValueError as error:
-            raise KincheckError(f"{OPTION}: {self.command!r}: {error}; {form}") from None
+            raise KincheckError(f"{OPTION}: {self.command!r}: {error}. {form}") from None
         if not words or not fields.issubset(FILES) or "out" not in fields:
             raise KincheckError(
                 f"{OPTION}: found {self.command!r}, expected a program, {{out}}, and no other"
-                f" braces than {{case}} and {{samples}}; {form}"
+                f" braces than {{case}} and {{samples}}. {form}"
             )
         if shutil.which(words[0]) is None:
             raise KincheckError(

@@ -280,7 +280,7 @@ def _description(file: Path) -> tuple[Element, Sequence[str]]:
     try:
         # machine code shrinks to a third, and tables to a tenth
         if problem := too_large(data, min(max(USUAL_SIZE, RATIO * len(data)), 4 * LARGEST_FMU)):
-            raise fault(file, "", f"{problem}; {LESS}")
+            raise fault(file, "", f"{problem}: {LESS}")
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             names = archive.namelist()
             size = archive.getinfo("modelDescription.xml").file_size

@@ -94,7 +94,7 @@ def _wrong_length(samples: Samples, name: str, accuracy: Accuracy) -> tuple[floa
     k = int(bad[off[bad].argmax()])
     text = (
         f"the recorded attitude of {name} is a quaternion of length {length[k]:.9g} at sample {k},"
-        f" expected 1, tolerance {allowed[k]:.3g}; {len(bad)} of {samples.count} samples are off:"
+        f" expected 1, tolerance {allowed[k]:.3g}. {len(bad)} of {samples.count} samples are off:"
         " correct its columns"
     )
     return float(off[k]), text
@@ -144,7 +144,7 @@ def _sentence(found: Residuals, quantity: str, worst: Worst, tolerance: float, u
     count, others = int(bad.sum()), left[~bad]
     if count < len(left) and others.size:
         largest = value_text(f"{float(np.nanmax(others)):.2g}", unit)
-        text += f"; {len(left) - count} of {len(left)} samples leave {largest} at most"
+        text += f". {len(left) - count} of {len(left)} samples leave {largest} at most"
     return text + (": suspect the recording" if count == 1 else "")
 
 
@@ -185,7 +185,7 @@ def _fitting_readings(case: Case, samples: Samples, tolerance: float) -> str:
     if not found:
         return ""
     listed = shortened(found, _NAMED, " or ")
-    return f"; read as {listed} the gap is within the printed digits: say so in --map"
+    return f". Read as {listed} the gap is within the printed digits: say so in --map"
 
 
 def _scaled(meaning: Meaning, factor: float) -> Meaning:

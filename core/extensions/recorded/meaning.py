@@ -124,14 +124,14 @@ global axes; as Adams names those on the marker I.
 _IN_BRACKETS = re.compile(r"(.*?)\s+\[([^\[\]]*)\]")
 _QUATERNIONS = {"wxyz": ("e0", "e1", "e2", "e3"), "xyzw": ("qx", "qy", "qz", "qw")}
 FORM = (
-    'say --map "NAME=COLUMN", "NAME=-COLUMN+12 [mm]", or of a body --map "BODY=PREFIX: x y z, euler'
+    'Say --map "NAME=COLUMN", "NAME=-COLUMN+12 [mm]", or of a body --map "BODY=PREFIX: x y z, euler'
     ' 321 a b c [deg]", "BODY=PREFIX: x y z, quaternion xyzw qx qy qz qw" or, planar,'
     ' "BODY=PREFIX: x y angle, velocity vx vy w"'
 )
 
 ACCURACY = "--accuracy"
 ACCURACY_FORM = (
-    f'say {ACCURACY} "acceleration=1e-4" for a share of the largest, or {ACCURACY} "toe=0.02 deg"'
+    f'Say {ACCURACY} "acceleration=1e-4" for a share of the largest, or {ACCURACY} "toe=0.02 deg"'
 )
 _ROW_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
@@ -233,7 +233,7 @@ class Reader:
         for text in texts:
             left, equals, right = (part.strip() for part in text.rpartition("="))
             if not (left and equals and right):
-                raise self._fault(f"found {shown(text)}, expected an equation; {FORM}")
+                raise self._fault(f"found {shown(text)}, expected an equation. {FORM}")
             if left in (*numbers, *bodies) or prefixes.get(left, left) != left:
                 raise self._fault(f"found {shown(left)} twice, expected it once. Leave one out")
             if left == EVENT and right in ("first", "last"):
@@ -251,12 +251,12 @@ class Reader:
         for body, prefix in prefixes.items():
             if prefix != body and body not in bodies:
                 problem = f"found no pose of {body} in columns of known names below {shown(prefix)}"
-                raise self._fault(f"{problem}; {FORM}")
+                raise self._fault(f"{problem}. {FORM}")
         if not {*numbers} - {TIME} and not bodies:
             listed = shortened([brief(shown(head.name)) for head in self.heads], MOST_NAMED)
             known = shortened([*map(brief, [n for n in self.targets if n != TIME][:6])], MOST_NAMED)
             problem = f"found the columns {listed or 'none'}, expected one of {known}, or poses"
-            raise fault(self.file, "", f"{problem} of {', '.join(prefixes)}; {FORM}")
+            raise fault(self.file, "", f"{problem} of {', '.join(prefixes)}. {FORM}")
         found = Meaning(numbers, bodies, event)
         taken = {use.column for use in found.uses}
         left = [head.name for k, head in enumerate(self.heads) if k not in taken]
@@ -306,7 +306,7 @@ class Reader:
         if left in self.targets:
             raise unknown_name(self.file, MAP, right, columns, "a column of the file")
         known = [*self.targets, *(body.name for body in self.case.mechanism.moving), *columns]
-        raise unknown_name(self.file, MAP, left, known, f"a quantity, body or column; {FORM}")
+        raise unknown_name(self.file, MAP, left, known, f"a quantity, body or column. {FORM}")
 
     def _column(self, name: str, prefix: str = "") -> int:
         """Return the index of the only column of a name, below a prefix if one is given."""
@@ -347,7 +347,7 @@ class Reader:
                 what, names = "position", [key, *names]
             if len(names) not in counts or what in groups:
                 problem = f"found {shown(part.strip())}, expected {counts[-1]} columns of {what}"
-                raise self._fault(f"{problem}, once; {FORM}")
+                raise self._fault(f"{problem}, once. {FORM}")
             named = (self._column(name, prefix.strip() if colon else "") for name in names)
             groups[what] = tuple(Use(k, si, unit) for k in named)
         planar = "attitude" not in groups and self._is_planar(groups.get("position", ()))
@@ -360,12 +360,12 @@ class Reader:
             counts = [1, 3] if planar and what in _PLANAR.values() else [2, 3] if planar else [3]
             if what in _OF_MOTION and len(uses) not in counts:
                 problem = f"found {len(uses)} columns of {what}, expected {counts[0]}"
-                raise self._fault(f"{problem} of {'a planar' if planar else 'this'} pose; {FORM}")
+                raise self._fault(f"{problem} of {'a planar' if planar else 'this'} pose. {FORM}")
         lacking = [each for each in ("position", "attitude") if each not in groups]
         lacking += [b for a, b in _NEEDS if a in groups and b not in groups]
         if lacking:
             problem = f"found {shown(text)} without {' and '.join(lacking)}, expected them"
-            raise self._fault(f"{problem}; {FORM}")
+            raise self._fault(f"{problem}. {FORM}")
         return Pose(groups, reading, tuple(turned), frame)
 
     def _is_planar(self, position: Sequence[Use]) -> bool:
@@ -536,7 +536,7 @@ def read_accuracy(file: Path, case: Case, texts: Sequence[str]) -> Accuracy:
         found = number_or_nan(number)
         if not 0.0 < found < float("inf"):
             raise fault(
-                file, ACCURACY, f"found {shown(text)}, expected a positive number; {ACCURACY_FORM}"
+                file, ACCURACY, f"found {shown(text)}, expected a positive number. {ACCURACY_FORM}"
             )
         if unit.strip():
             sizes[name] = require_unit(file, ACCURACY, name, unit.strip(), units[name]).convert(

@@ -111,7 +111,7 @@ def _of_mat(file: Path, choose: Choose) -> Recording:
     try:
         # scipy tells the level so
         if data[:4].count(0) == 0 and _unpacked_size(data) > LARGEST_FILE:
-            raise fault(file, "", f"found more than {LARGEST_FILE} bytes when unpacked; {LESS}")
+            raise fault(file, "", f"found more than {LARGEST_FILE} bytes when unpacked: {LESS}")
         scipy_io: Any = import_module("scipy.io")  # slow to import
         found: dict[str, Any] = scipy_io.loadmat(io.BytesIO(data), chars_as_strings=False)
         modelica = "Aclass" in found and "dataInfo" in found
@@ -246,14 +246,14 @@ _LONG = (
 )
 
 UNREAD: Mapping[str, str] = {
-    ".abf": "a binary result of MotionSolve; in HyperGraph, export the curves as CSV",
-    ".mrf": "a binary result of MotionSolve; in HyperGraph, export the curves as CSV",
-    ".sbr": "a binary result of Simpack; in its PostProcessor, export the channels as CSV",
-    ".req": "a request file of Adams; say RESULTS/XRF in the deck, which writes XML (.res)",
-    ".gra": "a graphics file of Adams; say RESULTS/XRF in the deck, which writes XML (.res)",
-    ".mdf": "a measurement file (MDF); export the channels as CSV",
-    ".mf4": "a measurement file (MDF); export the channels as CSV",
-    ".fmu": "a model, not its results; say --fmu FILE",
+    ".abf": "a binary result of MotionSolve. In HyperGraph, export the curves as CSV",
+    ".mrf": "a binary result of MotionSolve. In HyperGraph, export the curves as CSV",
+    ".sbr": "a binary result of Simpack. In its PostProcessor, export the channels as CSV",
+    ".req": "a request file of Adams. Say RESULTS/XRF in the deck, which writes XML (.res)",
+    ".gra": "a graphics file of Adams. Say RESULTS/XRF in the deck, which writes XML (.res)",
+    ".mdf": "a measurement file (MDF). Export the channels as CSV",
+    ".mf4": "a measurement file (MDF). Export the channels as CSV",
+    ".fmu": "a model, not its results. Say --fmu FILE",
 }
 """Formats that are not read, and the export to choose, by suffix."""
 
@@ -348,8 +348,8 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
     text = read_text(file, LARGEST_FILE, LESS)
     if not text.lstrip().startswith("<"):
         what = "no XML, as of old results of Adams" if text.strip() else "an empty file"
-        advice = "say RESULTS/XRF in the deck, which writes XML"
-        raise fault(file, "", f"found {what}, expected results in XML; {advice}")
+        advice = "Say RESULTS/XRF in the deck, which writes XML"
+        raise fault(file, "", f"found {what}, expected results in XML. {advice}")
     root = parse_xml(file, text)
     if root.tag != "Results":
         raise root.fault("found another document, expected <Results> of Adams. Give its .res")
@@ -365,8 +365,8 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
     chosen = [key for key, name in names.items() if wanted in (None, name, key[0])]
     if len(chosen) != 1:
         listed = ", ".join(map(shown, names.values())) or "none"
-        advice = remedy(wanted, names.values()) if wanted else "say --analysis NAME"
-        raise fault(file, "--analysis", f"found the analyses {listed}, expected one; {advice}")
+        advice = f": {remedy(wanted, names.values())}" if wanted else ". Say --analysis NAME"
+        raise fault(file, "--analysis", f"found the analyses {listed}, expected one{advice}")
     analysis, data = found[chosen[0]]
     heads = _heads(analysis)
     steps = [(step, step.text.split()) for step in data.findall("Step")]

@@ -41,7 +41,7 @@ def table_of_json(file: Path, limit: int, why_limit: str) -> tuple[Table, list[s
     tables = {**found.tables, **found.columns_as_table()}
     if len(tables) != 1:
         listed = shortened([shown(name) for name in tables], MOST_NAMED)
-        several = f"found the tables {listed}, expected one; write a file for each"
+        several = f"found the tables {listed}, expected one. Write a file for each"
         raise fault(file, "", several if tables else f"found no records, {_FORM}. Write them so")
     ((key, records),) = tables.items()
     names = [*dict.fromkeys(name for record in records for name in record)]

@@ -45,7 +45,7 @@ class Recordings(EngineSource):
         default=(),
     )
     fmu: Sequence[Path] = option(
-        "a functional mock-up unit (FMI 2 or 3) as an engine; --map VARIABLE=NAME says which"
+        "a functional mock-up unit (FMI 2 or 3) as an engine. --map VARIABLE=NAME says which"
         " variables are drivers and outputs of the case",
         Path,
         "FILE",
@@ -98,7 +98,7 @@ class Program(EngineSource):
 
     FOR = CHECK_ENGINE
     engine_command: str | None = option(
-        'a program as an engine, "prog {case} {samples} {out}"; see run',
+        'a program as an engine, "prog {case} {samples} {out}". See run',
         metavar="COMMAND",
         default=None,
     )

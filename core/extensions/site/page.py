@@ -27,6 +27,7 @@ COLUMNS: Mapping[str, Sequence[str]] = {
     "Pages": ("kind", "page"),
 }
 LABELS = {"Board": 4, "Speed": 3}
+RUN_PAGES = "report.html", "kc.html"
 PAGES = "findings", "gallery", "benchmarks"
 
 
@@ -37,10 +38,11 @@ def report(folder: Path, found: Sequence[tuple[Path, Document]]) -> Report:
         if isinstance(document, Bisection):
             lines["Changes by release"] += _changes(folder, path, document)
         elif isinstance(document, Board):
-            lines["Board"] += _board(path, document)
+            lines["Board"] += _board(folder, path, document)
         else:
-            lines["Runs"] += _runs(path, document)
-            lines["Speed"] += _speed(path, document)
+            link = _link(folder, path, *map(path.with_name, RUN_PAGES))
+            lines["Runs"] += _runs(link, document)
+            lines["Speed"] += _speed(link, document)
     lines["Pages"] += _pages(folder)
     wrong = sum(bad for each in lines.values() for _, _, bad in each)
     return Report(
@@ -50,6 +52,13 @@ def report(folder: Path, found: Sequence[tuple[Path, Document]]) -> Report:
         [_section(name, each) for name, each in lines.items() if each],
         linked=True,
     )
+
+
+def _link(folder: Path, document: Path, *pages: Path) -> str:
+    """Return the first of these pages that is in the folder, else the document itself; a link to a
+    folder would list its files when the page is opened from the disk.
+    """
+    return next((each for each in pages if (folder / each).is_file()), document).as_posix()
 
 
 def _section(name: str, lines: Sequence[Line]) -> Section:
@@ -70,21 +79,22 @@ def _section(name: str, lines: Sequence[Line]) -> Section:
 
 def _changes(folder: Path, path: Path, found: Bisection) -> Iterator[Line]:
     """Yield the changes; one for the worse is wrong. Without changes, one row says so."""
-    page = str(path.with_suffix(".html"))
+    page = path.with_suffix(".html")
     for each in found.changes:
         name = f"{found.package} {each.earlier} → {each.later}"
-        made = f"{path.parent / each.reproducer}/README.md" if each.reproducer else page
+        made = [path.parent / each.reproducer / "README.md"] if each.reproducer else []
         worse = each.kind == "result" and each.right in (each.earlier, NEITHER)
-        link = made if (folder / made).is_file() else str(path)
+        link = _link(folder, path, *made, page)
         cells = (each.kind, ", ".join(each.cases), each.right, each.field or "", each.repeat)
         yield (found.engine, name, *cells), link, worse
     if not found.changes:
         name = f"{found.package} {' → '.join(found.ends)}"
         tried = f"none in {number_of(len(found.tried), 'release')}"
-        yield (found.engine, name, tried, "", "", "", found.command), str(path), False
+        link = _link(folder, path, page)
+        yield (found.engine, name, tried, "", "", "", found.command), link, False
 
 
-def _runs(path: Path, found: Results) -> Iterator[Line]:
+def _runs(link: str, found: Results) -> Iterator[Line]:
     """Yield the cases of each engine and outcome."""
     groups: dict[tuple[str, str, Outcome], list[str]] = {}
     for each in found.records:
@@ -94,22 +104,23 @@ def _runs(path: Path, found: Results) -> Iterator[Line]:
         bad = outcome.bad
         names = ", ".join(cases) if bad else number_of(len(cases), "case")
         repeat = f"kincheck run {' '.join(cases)} --engine {engine.partition(' ')[0]}" * bad
-        link = str(path.with_name("report.html"))
         yield (engine, version, outcome.shown, names, repeat), link, bad
 
 
-def _speed(path: Path, found: Results) -> Iterator[Line]:
+def _speed(link: str, found: Results) -> Iterator[Line]:
     for each in found.records:
         if each.us_per_step is not None:
             name = product(each.engine, each.mode)
             cells = each.case, name, each.version or "", number(each.us_per_step)
-            yield cells, str(path.with_name("report.html")), False
+            yield cells, link, False
 
 
-def _board(path: Path, found: Board) -> Iterator[Line]:
+def _board(folder: Path, path: Path, found: Board) -> Iterator[Line]:
     for each in found.rows:
         error = number(each.runs[-1].error if each.runs else None)
-        link = str(path.parent / each.folder / "run.py") if each.folder else str(path)
+        made = [path.parent / each.folder / "run.py"] if each.folder else []
+        own = [path.with_name("index.html")] if path.parent.name else []
+        link = _link(folder, path, *made, *own)
         bad = each.state in ("timeout", "crashed")
         yield (each.case, each.name, each.version, each.state, error), link, bad
 
@@ -117,7 +128,9 @@ def _board(path: Path, found: Board) -> Iterator[Line]:
 def _pages(folder: Path) -> Iterator[Line]:
     """Yield the documentation's pages of findings, gallery and speed, if it is built there."""
     for name in PAGES:
-        for file in sorted(folder.glob(f"docs/{name}/**/index.html")):
+        for file in sorted(
+            [*folder.glob(f"docs/{name}.html"), *folder.glob(f"docs/{name}/**/*.html")]
+        ):
             title = re.search(r"<title>(.*?)( - kincheck)?</title>", file.read_text("utf-8"), re.S)
             text = html.unescape(title[1]).strip() if title else file.parent.name
-            yield (name, text), str(file.relative_to(folder)), False
+            yield (name, text), file.relative_to(folder).as_posix(), False

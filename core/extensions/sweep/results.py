@@ -15,8 +15,8 @@ from ...case.units import ANGLES, LENGTHS, in_units
 from ...dataset import Dataset, Variable
 from ...errors import number_of
 from ...harness.compare import numbers
-from ...harness.labels import driver_unit
 from ...harness.record import Outcome
+from ...harness.table_units import driver_unit
 from ...tabular import Tabular
 from ...trajectory import Array
 from .conformance import Capability, Histogram

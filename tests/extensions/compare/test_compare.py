@@ -6,6 +6,7 @@ import json
 import kincheck
 import pytest
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.compare import designs
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from ...report.page import Page
@@ -208,3 +209,12 @@ direction = [1, 0, 0]
         "joints.axle.point": "5, 0, 0",
         "joints.axle.axis": "0, 0.6, -0.2",
     }
+
+
+def test_columns_stand_at_the_decimal(old, new):
+    """And what is below the digits of an output is 0, not a power of ten."""
+    rows = designs.comparison(kincheck.compare(old, new), []).sections[0].rows
+    for column in [*zip(*rows, strict=True)][2:-1]:
+        cells = [each.replace("\u2008", ".") for each in column if each]
+        assert len({len(each.partition(".")[2]) for each in cells}) == 1
+        assert not any("e" in each for each in cells)

@@ -230,7 +230,7 @@ def test_load_beyond_equilibrium_is_counted(tmp_path, capsys):
     assert "nan" not in out + (tmp_path / "kc.html").read_text().partition('id="matrix"')[2]
     said = err.splitlines()
     assert "no equilibrium at travel -0.06 m with braking 3e+09 N: the last is" in said[-6]
-    assert "2 further samples without equilibrium; give less travel or load" in said[-1]
+    assert "2 further samples without equilibrium. Give less travel or load" in said[-1]
 
 
 @pytest.mark.parametrize(
@@ -244,9 +244,9 @@ def test_load_beyond_equilibrium_is_counted(tmp_path, capsys):
         ("", "--travel=0:1", "START:STOP:SAMPLES"),
         ("", "--travel=0:1furlong:3", "START:STOP:SAMPLES"),
         ("", "--travel=nan:1:3", "START:STOP:SAMPLES"),
-        ("", "--travel=-30mm", "one sample is -30mm:-30mm:1"),
+        ("", "--travel=-30mm", "--travel=20mm:20mm:1 for one place"),
         ("", f"--out {__file__}", "cannot be made a folder"),
-        ("", "--travel=0:3deg:3", "numbers in m or mm or cm"),
+        ("", "--travel=0:3deg:3", "unless a unit (m, mm, cm, inch, foot) is given"),
         ("", "--load lateral=0:3Nm:3", "numbers in N or kN"),
         ("", "--load aligning=0:3N:3", "numbers in Nm or kNm"),
     ],
@@ -344,6 +344,7 @@ def test_engine_equilibria_equal_data(load_cases, name):
         assert found.forces.drivers["stroke"][0] == pytest.approx(row["wheel_load"], abs=4e-6)
 
 
+@pytest.mark.nightly
 def test_engine_verdicts_on_axle(tmp_path, capsys):
     """Both wheels against each other, with an anti-roll bar."""
     names = ["mujoco", "exudyn-static"]
@@ -398,6 +399,7 @@ def test_engine_without_statics_is_unsupported(tmp_path, capsys):
     assert "finds no equilibria" in capsys.readouterr().out
 
 
+@pytest.mark.nightly
 def test_bench_compliance_times_samples_and_matrices(tmp_path, capsys):
     out = tmp_path / "bench.json"
     command = ["bench", "compliance", strut_file(tmp_path), "--rounds=1", f"--json={out}"]

@@ -115,7 +115,10 @@ def slider(mass=2.0, **load):
 
 @pytest.mark.parametrize(
     ("k", "c", "end", "method"),
-    [(40.0, 4000.0, 1.0, "Radau"), (4e4, 200.0, 0.3, "DOP853")],
+    [
+        pytest.param(40.0, 4000.0, 1.0, "Radau", marks=pytest.mark.nightly),
+        (4e4, 200.0, 0.3, "DOP853"),
+    ],
     ids=["creeps", "comes to rest"],
 )
 def test_damped_block_follows_its_closed_form(k, c, end, method):
@@ -133,6 +136,7 @@ def test_damped_block_follows_its_closed_form(k, c, end, method):
     assert np.abs(found.motion.points["p"].position[found.samples, 0] - expected.real).max() < 1e-13
 
 
+@pytest.mark.nightly
 def test_torsional_spring_swings_beyond_turns():
     spring = TorsionSpringDamper("s", "hinge", stiffness=3.0, free_angle=10.0)
     body = Body("rod", mass=1.0, center_of_mass=(0.0, 0.0, 0.0), inertia=(0.2, 0.3, 0.4, 0, 0, 0))

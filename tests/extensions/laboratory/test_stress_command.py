@@ -107,20 +107,17 @@ def test_stress_without_samples_has_status_2(tmp_path, capsys, monkeypatch, engi
     monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": engine)
     assert main.main("stress --family units --samples 20 --no-proofs".split()) == 2
     out, err = capsys.readouterr()
-    count = re.search(r"^No sample was examined, (\d+) unsupported$", out, re.MULTILINE)
+    count = re.search(r"^No sample was judged, (\d+) unsupported$", out, re.MULTILINE)
     assert count, out
     assert (
-        f"kincheck: native projection: no sample was examined, {count[1]} unsupported: {why}\n"
-        in err
+        f"kincheck: native projection: no sample was judged, {count[1]} unsupported: {why}\n" in err
     )
     file = tmp_path / "rssr.toml"
     file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
     assert main.main(["stress", "--replay", str(file)]) == 2
     out, err = capsys.readouterr()
     assert "unsupported 181" in out
-    assert (
-        "kincheck: no sample of native was examined. Give another engine or other files.\n" in err
-    )
+    assert "kincheck: no sample of native was judged. Give another engine or other files.\n" in err
 
 
 def cell(name="one", **samples):

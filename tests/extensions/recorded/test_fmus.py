@@ -220,5 +220,5 @@ def test_fmu_zip_bomb_is_refused(last_record, tmp_path, capsys):
             archive.writestr(f"resources/{k}", bytes(100_000_000))
     assert file.stat().st_size < 400_000
     assert last_record(case, "--fmu", file)[0] == 2
-    told = "unpacks to 300000022 bytes, expected 256000000 at most; export it without resources"
+    told = "unpacks to 300000022 bytes, expected 256000000 at most: export it without resources"
     assert told in capsys.readouterr().err

@@ -182,16 +182,16 @@ def damaged(place, number):
 RESULTS = (DATA / "fourbar.res").read_text()
 TWO = RESULTS.replace("</Data>\n<Term", "</Data><Data name='dynamic_002'></Data>\n<Term")
 REFUSED = {
-    "MotionSolve": ("a.abf", b"\0", "of MotionSolve; in HyperGraph, export the curves as CSV"),
+    "MotionSolve": ("a.abf", b"\0", "of MotionSolve. In HyperGraph, export the curves as CSV"),
     "Simpack": ("a.sbr", b"\0", "Simpack; in its PostProcessor, export the channels as CSV"),
-    "requests": ("a.req", b"\0", "a request file of Adams; say RESULTS/XRF in the deck"),
+    "requests": ("a.req", b"\0", "a request file of Adams. Say RESULTS/XRF in the deck"),
     "level 7.3": ("a.mat", b"MATLAB 7.3 MAT-file", "of version 7.3. In MATLAB: save"),
     "no MAT-file": ("a.mat", b"junk" * 99, "found no readable MAT-file"),
     "no driver": ("a.csv", "time,z\n0,1\n", "the columns 'time', 'z', expected one of MOTION_1"),
     "two analyses": (
         "a.res",
         TWO,
-        "the analyses 'kinematic_001', 'dynamic_002', expected one; say --analysis NAME",
+        "the analyses 'kinematic_001', 'dynamic_002', expected one. Say --analysis NAME",
     ),
     "cut off": ("a.res", RESULTS[:5000], "not valid XML"),
     "old text": ("a.res", "1 2 3\n", "say RESULTS/XRF in the deck, which writes XML"),

@@ -71,7 +71,8 @@ def test_wrong_release_is_red(tmp_path, right, wrong):
 def test_site_links_resolve(tmp_path):
     bisection(tmp_path, "6.0")
     assert main(["run", "four_bar", "--engine", "native", "-q", "--out", f"{tmp_path}/run"]) == 0
-    page = tmp_path / "docs/findings/simulators/index.html"
+    put(tmp_path, "without_page/results.json", run_case(crank(), Fake("right")))
+    page = tmp_path / "docs/findings/simulators.html"
     page.parent.mkdir(parents=True)
     page.write_text("<title>Simulators &amp; more - kincheck</title>")
     row = Row(
@@ -94,7 +95,7 @@ def test_site_links_resolve(tmp_path):
     assert main(["site", "--out", str(tmp_path)]) == 1
     text = (tmp_path / "index.html").read_text()
     links = [each for each in re.findall(r'href="([^"#]+)"', text) if not each.startswith("data:")]
-    assert len(set(links)) == 4
+    assert len(set(links)) == 5
     assert all((tmp_path / each).is_file() for each in links)
     assert "Simulators &amp; more" in text
     assert [row.split()[0] for row in red(tmp_path)] == ["wobble", "bricard"]

@@ -5,9 +5,11 @@ and the meaning of its sign.
 from .axle import AxleOutput
 from .base import PerTravel, Rate, SuspensionOutput
 from .corner import Axle, Convention, Reaction, Side, Vehicle
+from .instant_centers import SWING_ARMS
 from .wheel import Camber, MotionRatio, Toe, camber_of_front_view
 
 __all__ = [
+    "SWING_ARMS",
     "Axle",
     "AxleOutput",
     "Camber",

@@ -13,10 +13,11 @@ All angles come from vectors: toe and camber of a turned wheel are no Euler angl
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import operator
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TypeAlias
 
 from ....algebra import Scalar, Vec3, cross, is_array, vec
@@ -261,13 +262,29 @@ class Corner:
         the carrier and perpendicular to the axis of rotation; only these turn. The third direction,
         a cross product, appears twice, so its sign cancels.
         """
-        w, s = self.rise, self.spin
-        beside = self.point(self.vehicle.top_marker) - self.center
-        top = _unit(beside - (beside @ s) * s)
-        third = cross(s, top)
+        w = self.rise
+        _, top, third = self._axes_of_carrier
         return velocity(self.center) - self.radius * (
             (top @ w) * velocity(top) + (third @ w) * velocity(third)
         )
+
+    @cached_property
+    def _axes_of_carrier(self) -> tuple[Vec3, Vec3, Vec3]:
+        """Three perpendicular unit vectors fixed to the wheel carrier, the first along the spin."""
+        s = self.spin
+        beside = self.point(self.vehicle.top_marker) - self.center
+        top = _unit(beside - (beside @ s) * s)
+        return s, top, cross(s, top)
+
+    @cached_property
+    def roll(self) -> Jet:
+        """Rate of turn of the carrier in the view from the front, from outboard to up [rad/s]."""
+        return _sum(velocity(axis).z * axis.y for axis in self._axes_of_carrier)
+
+    @cached_property
+    def pitch(self) -> Jet:
+        """Rate of turn of the carrier in the view from the side, from up to forward [rad/s]."""
+        return _sum(velocity(axis).x * axis.z for axis in self._axes_of_carrier)
 
     @cached_property
     def kingpin(self) -> tuple[Vec3, Vec3]:
@@ -309,6 +326,10 @@ def angle_in_view(y: Jet, x: Jet, size: Scalar = 1.0) -> Jet:
 def velocity(a: Vec3) -> Vec3:
     """Return the time derivative of a vector of jets."""
     return each(a, lambda jet: jet.dot)
+
+
+def _sum(parts: Iterable[Jet]) -> Jet:
+    return reduce(operator.add, parts)
 
 
 def _unit(a: Vec3) -> Vec3:

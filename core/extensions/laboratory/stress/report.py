@@ -74,7 +74,7 @@ def headline(cells: Sequence[Cell]) -> str:
     sentence = (
         f"{wrong or 'None'} of {examined} samples silently wrong"
         if examined
-        else "No sample was examined"
+        else "No sample was judged"
     )
     apart = (Verdict.UNJUDGED, Verdict.UNSUPPORTED)
     counts = [f"{count} {SHORT[each]}" for each in apart if (count := _count(cells, each))]

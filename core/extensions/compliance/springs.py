@@ -1,0 +1,121 @@
+"""Springs that a study adds to a case: between the points of a motion ratio, or under the wheel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import msgspec
+
+from ...case.case import Case
+from ...case.io.document import measure
+from ...case.units import FORCES, Unit
+from ...errors import KincheckError, unknown
+from ...mechanism.loads import ForceElement, SpringDamper
+from ...mechanism.mechanism import Vector
+from ..hardpoints.suspension import MotionRatio
+from .rates import SIDES
+from .section import KEY, rig_of
+
+TIRE = "tire"
+"""Name of the spring under each wheel, which makes a ride rate of the wheel rate."""
+RATES: Mapping[str, Unit] = {
+    name: Unit(name, size, size.__mul__)
+    for name, size in {
+        "N/m": 1.0,
+        "N/mm": 1e3,
+        "kN/m": 1e3,
+        "kN/mm": 1e6,
+        "lb/in": 175.126835,
+    }.items()
+}
+EXAMPLE = '--spring "spring: 35 N/mm"'
+Rate = float | tuple[float, float]
+
+
+def springs_in(texts: Sequence[str]) -> dict[str, Rate]:
+    """Return the springs of an option, "NAME: RATE" or "NAME: RATE, FORCE", in SI.
+
+    Raises:
+        KincheckError: a text is none.
+    """
+    found = dict[str, Rate]()
+    for text in texts:
+        name, _, rest = text.partition(":")
+        rate, _, force = rest.partition(",")
+        try:
+            stiffness, unit = measure(rate, RATES, "N/m")
+            preload, of_force = measure(force, FORCES, "N") if force else (0.0, "N")
+        except ValueError:
+            unit = of_force = ""
+            stiffness = preload = math.nan
+        if not (unit and of_force and 0.0 < stiffness < math.inf and math.isfinite(preload)):
+            raise KincheckError(
+                f"--spring {text!r}: expected a rate in {', '.join(RATES)}, and perhaps the force"
+                f' at design in N or kN. Say {EXAMPLE}, or "spring: 35 N/mm, 3 kN"'
+            )
+        found[name.strip()] = (stiffness, preload)
+    return found
+
+
+def places_of(case: Case) -> dict[str, list[MotionRatio]]:
+    """Return the motion ratios of a case by the names of their springs: of an axle, one name has
+    both sides.
+    """
+    found = dict[str, list[MotionRatio]]()
+    for output in case.outputs:
+        if isinstance(output, MotionRatio):
+            name = output.name.removesuffix("_ratio")
+            for side in SIDES:
+                name = name.removeprefix(f"{side}_")
+            found.setdefault(name, []).append(output)
+    return found
+
+
+def with_springs(case: Case, springs: Mapping[str, Rate]) -> Case:
+    """Return the case with springs; they are compressed at design by their forces.
+
+    Raises:
+        KincheckError: the case has no points of such a spring.
+    """
+    places, mechanism, made = places_of(case), case.mechanism, list[SpringDamper]()
+    for name, given in springs.items():
+        rate, force = given if isinstance(given, tuple) else (given, 0.0)
+        if name == TIRE:
+            rig = msgspec.structs.replace(rig_of(case), tire_stiffness=rate)
+            case = replace(case, tables={**case.tables, KEY: rig})
+            continue
+        if name not in places:
+            what = unknown("spring", name, [*places, TIRE])
+            raise KincheckError(f"{case.name}: --spring: {what}. {how_to_add(case)}")
+        for ratio in places[name]:
+            first, second = (mechanism.point(point) for point in ratio.between)
+            ends = first.position, second.position
+            if there := [each.name for each in mechanism.forces if {*ends} <= {*_ends(each)}]:
+                raise KincheckError(
+                    f"{case.name}: --spring: {there[0]!r} of the case is between {first.name} and"
+                    f" {second.name} already. Leave out {name!r}"
+                )
+            label = f"{ratio.name.removesuffix('_ratio')} of --spring"
+            free = math.dist(*ends) + force / rate
+            bodies = first.body, second.body
+            made.append(SpringDamper(label, *bodies, ends, rate, free_length=free))
+    return replace(case, mechanism=replace(mechanism, forces=(*mechanism.forces, *made)))
+
+
+def _ends(each: ForceElement) -> Sequence[Vector]:
+    return each.points if isinstance(each, SpringDamper) else ()
+
+
+def how_to_add(case: Case) -> str:
+    """Return what to type for a spring: a sentence."""
+    if places := [*places_of(case)]:
+        name = "spring" if "spring" in places else places[0]
+        return f"Add {EXAMPLE.replace('spring:', f'{name}:')} with your rate"
+    if case.hardpoints:
+        return (
+            "Add the points spring_lower and spring_upper to the table, and"
+            f" {EXAMPLE} with your rate"
+        )
+    return 'Add [forces.NAME] type = "spring_damper" to the case'
