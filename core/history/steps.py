@@ -300,7 +300,8 @@ def _times(history: History, pair: Pair, entries: Sequence[Entry]) -> Iterator[S
     loops = {run: calibration(row.circumstances) for run, row in history.runs.items()}
     by_machine: dict[Any, list[tuple[Entry, float]]] = {}
     for entry in entries:
-        if entry.seconds and (loop := loops[entry.run]):
+        # without the waits of a busy machine, a time may be below zero
+        if entry.seconds and entry.seconds > 0.0 and (loop := loops[entry.run]):
             machine = history.runs[entry.run].circumstances.get("processor")
             by_machine.setdefault(machine, []).append((entry, math.log(entry.seconds / loop)))
     for series in by_machine.values():

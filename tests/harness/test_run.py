@@ -100,7 +100,7 @@ def test_single_deviating_sample_is_located():
     assert record.errors["y"].position.worst_step == 6
 
 
-def test_case_in_millimetres_is_told_in_them():
+def test_messages_have_units_of_file():
     """Its curves stay long: a wide table of them is one of hardpoints."""
     case = replace(crank("case"), length_unit="mm", angle_unit="deg")
     off_by = Fake(answer=off("position", lambda p: p + at(6, 1, 1e-6)(0 * p)))

@@ -142,6 +142,11 @@ def test_slow_nights_are_no_step(path):
     assert found(path) == []
 
 
+def test_time_below_zero_is_left_out(path):
+    slow_nights(path, [-1.0 if night == 5 else 1.0 for night in range(12)])
+    assert found(path) == []
+
+
 def test_repeated_slow_stretches_are_separate(path, capsys):
     slow_nights(path, 2 * ([1.0] * 8 + [2.0] * 8))
     assert [(each.first, each.worse, each.repaired) for each in found(path)] == [

@@ -143,7 +143,7 @@ def files(case: Case, places: Sequence[str], *, forces: bool = False) -> Mapping
     """Return the bytes of NAME.c and NAME.h, by the names of the files.
 
     Raises:
-        KincheckError: the case has a part that the code cannot have.
+        KincheckError: the code cannot have a part of the case.
     """
     solved = solved_case(case, places, forces=forces)
     name = identifier(case.name)

@@ -1,6 +1,6 @@
 """Dialects: the programs as lines of C or of JavaScript, and one text of the steps for both.
 
-The text is written in what both languages have in common; declarations and functions of mathematics
+The text is written in the words of both languages; declarations and functions of mathematics
 differ by a word.
 """
 
@@ -297,13 +297,13 @@ def program_text(name: str, program: Program) -> str:
 
 
 def _given(node: Sequence[object]) -> str:
-    """Return the text of a number that is not computed."""
+    """Return the text of an input or a constant."""
     op, value = node
     return f"s[{value}]" if op == "input" else _constant(float(str(value)))
 
 
 def _repeated(name: str, program: Program) -> str:
-    """Return the function of a program that runs over neighbouring slots, and keeps the largest."""
+    """Return the function of a program over neighbouring slots; the largest number is kept."""
     lines: list[str] = []
     for k, (op, *read) in enumerate(program.nodes):
         if op == "input":
@@ -340,10 +340,10 @@ def _constant(value: float) -> str:
 def _drive(
     k: int, slots: Sequence[int], motion: Motion, factor: float, steered: int
 ) -> Iterator[str]:
-    """Yield the lines that set the five numbers of the k-th driver at time t.
+    """Yield the lines for the five numbers of the k-th driver at time t.
 
     Args:
-        steered: the number of a lane that tells whether the way is straight; zero for none.
+        steered: the number of a lane for a straight way; zero for none.
     """
     shift = 0.0
     if isinstance(motion, Absolute):
@@ -380,7 +380,7 @@ def _drive(
 
 
 def _kept(each: CodeOutput) -> Iterator[str]:
-    """Yield the lines that count the turns of an output, or keep the sign of an attitude."""
+    """Yield the lines to count the turns of an output, or keep the sign of an attitude."""
     at = each.kept
     if each.period:
         ((x,), (v,), *_) = each.slots
@@ -395,7 +395,7 @@ def _kept(each: CodeOutput) -> Iterator[str]:
 
 
 def _told(k: int, each: CodeOutput) -> Iterator[str]:
-    """Yield the lines that write the three orders of an output at rate r."""
+    """Yield the lines to write the three orders of an output at rate r."""
     factors = ("", "r * ", "r * r * ")
     if each.quantity.forces:
         parts = [f"{factor!r} * f[{slot}]" for slot, factor in each.pushed.items()]

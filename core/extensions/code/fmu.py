@@ -1,5 +1,5 @@
 """A solved case as a functional mock-up unit, FMI 2 or 3: the C code with its sources, and a binary
-where a compiler is there.
+if a compiler is there.
 
 The driver and its rate are inputs; so are those of the other drivers, if they hold their values. A
 case driven by time has none. Beyond a lock-up the unit
@@ -232,7 +232,7 @@ def files(
     """Return the bytes of NAME.fmu, by the name of the file.
 
     Raises:
-        KincheckError: the case has a part that the code cannot have, or the compiler fails.
+        KincheckError: the code cannot have a part of the case, or the compiler fails.
     """
     solved = solved_case(case, places, forces=forces)
     name = identifier(case.name)
@@ -331,7 +331,7 @@ def description(solved: SolvedCase, name: str, fmi: int, token: str) -> str:
 
 
 def _inputs(solved: SolvedCase) -> list[tuple[str, float, float]]:
-    """Return the drivers that are inputs, with value and rate at the start; time for none."""
+    """Return the drivers as inputs, with value and rate at the start; time for none."""
     sweep, mechanism = solved.case.sweep, solved.case.mechanism
     if sweep.driver == TIME:
         return [(TIME, 0.0, 1.0)]

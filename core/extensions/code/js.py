@@ -77,14 +77,14 @@ def files(case: Case, places: Sequence[str], *, forces: bool = False) -> Mapping
     """Return the bytes of NAME.mjs, by the name of the file.
 
     Raises:
-        KincheckError: the case has a part that the code cannot have.
+        KincheckError: the code cannot have a part of the case.
     """
     text = source(solved_case(case, places, forces=forces)) + EXPORT
     return {f"{identifier(case.name)}.mjs": text.encode()}
 
 
 def source(solved: SolvedCase) -> str:
-    """Return the text of the class `Mechanism`, and all that it takes."""
+    """Return the text of the class `Mechanism`, with all its functions."""
     known = tables(solved) | {"NOMINAL": [each.nominal for each in solved.parameters]}
     words = words_of(solved)
     again = "place(w, this.values)" if solved.parameters else "{ copy(w, START); begin(w); }"

@@ -52,7 +52,7 @@ from ..sweep.varied_places import Geometry
 TOL = 1e-12
 """Largest accepted residual, as of `kincheck run`."""
 HALVINGS = 40
-"""Most halvings of a step in a row: what is left of it is no step in double precision."""
+"""Most halvings of a step in a row: its rest is no step in double precision."""
 SMALL = 1e-4
 """Square of the sine of half an angle below which three terms of the series of an angle over its
 sine give all digits: the fourth is 35/576 of its cube.
@@ -65,12 +65,12 @@ class CodeOutput:
 
     Attributes:
         slots: of its terms in a lane, by order; unknown orders have none.
-        resting: slots of the two speeds of an output that has no value at rest.
-        period: of an angle that counts turns; zero for none.
+        resting: slots of the two speeds of an output without a value at rest.
+        period: of an angle with counted turns; zero for none.
         at_design: value of such an angle at the design position.
-        kept: first number behind the slots that remembers its turns or its sign.
+        kept: first number behind the slots for its turns or its sign.
         completion: program of an attitude, from four Euler parameters and their rates.
-        pushed: of a force, the sum that it is: slots of forces, and a factor of each.
+        pushed: of a force, as a sum: slots of forces, and a factor of each.
     """
 
     quantity: Quantity
@@ -85,7 +85,7 @@ class CodeOutput:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of the geometry that a user of the code sets.
+    """A number of the geometry to be set by a user of the code.
 
     Attributes:
         nominal: its value at design [SI], in the axes of its file.
@@ -100,7 +100,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class SolvedCase:
-    """A case, and all that its code is made of."""
+    """A case, and all parts of its code."""
 
     case: Case
     model: Model
@@ -111,7 +111,7 @@ class SolvedCase:
     poses: Mapping[str, Sequence[int]]
     """Slots of origin [m] and Euler parameters, by body."""
     others: Sequence[Model]
-    """Models with other choices of the independent rows, where one does not hold over the sweep."""
+    """Models with other choices of the independent rows, if one does not hold over the sweep."""
     is_steered: bool
     """Whether each driver can be moved to a value of its own."""
 
@@ -124,15 +124,15 @@ class SolvedCase:
 
     @property
     def steered(self) -> int:
-        """The number of a lane that tells whether the drivers go a straight way; where it begins,
-        and the change, follow by driver.
+        """The number of a lane for a straight way of the drivers, above zero on one; its begin and
+        its change follow by driver.
         """
         kept = [each.kept + (4 if each.completion else 1) for each in self.outputs if each.kept]
         return max([self.at + 2, *kept])
 
     @property
     def at(self) -> int:
-        """The number behind the slots that holds the time of the lane; the choice of its rows is
+        """The number behind the slots for the time of the lane; the choice of its rows is
         the next.
         """
         return len(self.model.slots)
@@ -173,8 +173,8 @@ class SolvedCase:
 
     @property
     def standing(self) -> list[int]:
-        """Numbers of a lane that stay with another choice of rows: pose, geometry, limits, and what
-        follows the slots.
+        """Numbers of a lane kept with another choice of rows: pose, geometry, limits, and all
+        behind the slots.
         """
         given = [*self.model.prescribed, *self.model.varied]
         slots = [*self.state, *slots_of(self.model.vectors, given)]
@@ -182,7 +182,7 @@ class SolvedCase:
 
     @cached_property
     def start(self) -> list[float]:
-        """The numbers of a lane at the design position; a number that no program reads is zero."""
+        """The numbers of a lane at the design position; a number without a use is zero."""
         found = np.zeros(self.size)
         found[: self.at] = self.model.design
         for name, value in accept_by(TOL).items():
@@ -272,7 +272,7 @@ def solved_case(
             or with several drivers, each driver can be moved to a value of its own.
 
     Raises:
-        KincheckError: the case has a part that the code cannot have, or a place is unknown.
+        KincheckError: the code cannot have a part of the case, or a place is unknown.
     """
     names = [each.name for each in case.mechanism.drivers]
     if is_steered := bool(steered) or len(names) > 1:
@@ -333,7 +333,7 @@ def solved_case(
 
 
 def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:
-    """Return by output of a force the slots that it is a sum of, with the factor of each.
+    """Return by output of a force the slots of its sum, with the factor of each.
 
     Raises:
         KincheckError: forces cannot be traced, or redundant rows leave one undetermined.
@@ -375,7 +375,7 @@ def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:
 
 
 def loose_forces(case: Case) -> list[str]:
-    """Return the names of the outputs of forces that are undetermined somewhere on the sweep."""
+    """Return the names of the outputs of forces left undetermined somewhere on the sweep."""
     solver = NativeSolver()
     found = solver.prepare(case.mechanism, case.sweep.path, case.points, (), case.forces)(TOL)
     forces = [each for each in case.outputs if each.forces]
@@ -384,7 +384,7 @@ def loose_forces(case: Case) -> list[str]:
 
 
 def _other_rows(case: Case, model: Model, paths: Sequence[Path]) -> list[tuple[int, ...]]:
-    """Return the further choices of independent rows that native takes on paths."""
+    """Return the further choices of independent rows by native on paths."""
     if not model.selection.dropped:
         return []
     made, found = DesignOutputs.of(case, (), derivative=2), dict[tuple[int, ...], None]()

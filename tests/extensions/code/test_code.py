@@ -168,7 +168,7 @@ console.log(JSON.stringify(found));
 
 @compiled
 @pytest.mark.parametrize("name", ["five_bar", "mcpherson_steered"])
-def test_drivers_move_to_values_of_their_own(name, tmp_path):
+def test_drivers_move_to_own_values(name, tmp_path):
     """Straight from one value to another that is far, back and forth, then along the sweep."""
     case = kincheck.load(name)
     write(tmp_path, c.files(case, ()))
@@ -342,7 +342,7 @@ def test_fmu_passes_as_engine(version, tmp_path, monkeypatch, capsys):
 @compiled
 @pytest.mark.skipif(importlib.util.find_spec("fmpy") is None, reason="no FMPy")
 @pytest.mark.parametrize("version", [pytest.param(2, marks=pytest.mark.nightly), 3])
-def test_fmu_has_drivers_that_hold_as_inputs(version, tmp_path):
+def test_fmu_takes_held_drivers(version, tmp_path):
     fmpy, case = importlib.import_module("fmpy"), kincheck.load("five_bar")
     k, expected = 3, truth(case)
     held = replace(case, sweep=replace(case.sweep, motions={}), reference={})

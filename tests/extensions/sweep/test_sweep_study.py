@@ -358,7 +358,7 @@ def test_coarse_variants_count_nominal_turns(tmp_path):
     assert not np.abs(found.design).max() > 1e-9
 
 
-def test_rates_beside_stroke_end_have_rough_gradients(tmp_path):
+def test_rates_beside_end_are_rough(tmp_path):
     """Differences tell how rough they are; slopes are exact."""
     case = load("mcpherson_strut")
     variation = vary(tmp_path, case, axis={"at": "joints.lca_pivot.axis", "sigma": 0.1})
