@@ -9,7 +9,7 @@ from typing import Any
 
 from ....errors import SolveError
 from ....kinematics import NativeSolver
-from ....program.llvm.jit import compiled_at_once
+from ....program.executor import compiled_at_once
 from .rounds import Work, take_turns
 from .size import CHAIN, RING, SAMPLES, chain, circle
 
