@@ -17,7 +17,7 @@ from ..case.io.escape import visible
 from ..errors import shortened
 from ..harness.labels import displayed
 from ..harness.record import Facts, Outcome, Record, Results
-from ..harness.table_units import DRIVER_UNITS, driver_unit
+from ..harness.table_units import DRIVER_UNITS, driver_unit, is_table
 from ..unit_text import value_text, with_unit
 from . import terminal
 
@@ -187,7 +187,7 @@ def print_travel(results: Results, console: Console) -> None:
             for record in results.records
             if record.case == case and record.outcome in SOLVED and record.driver
         ]
-        if facts.get("units") and solved:
+        if is_table(facts) and solved:
             _print(solved[0], facts, console)
 
 
