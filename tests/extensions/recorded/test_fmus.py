@@ -188,9 +188,9 @@ def test_wrong_co_simulation_output_fails(judged):
     ("options", "text"),
     [
         ({"folder": "win64"}, "crank.fmu: has binaries for win64, this is linux64"),
-        ({"kinds": [MODEL], "states": True}, "export it for co-simulation"),
+        ({"kinds": [MODEL], "states": True}, "Export it for co-simulation"),
         ({"maps": ["angle=turn"]}, "found no output of the case among x, sum, free_x"),
-        ({"maps": ["sum=swing"]}, 'say --map "sum=swing [UNIT]"'),
+        ({"maps": ["sum=swing"]}, 'Say --map "sum=swing [UNIT]"'),
         ({"maps": ["free_x=swing"]}, "unit 'mm' of column 'free_x'"),
         ({"maps": ["sum=turn [rad]", "x=tip_x"]}, "found sum for turn, expected an input"),
         ({"jobs": "0"}, "--fmu runs foreign machine code in workers alone. Leave out --jobs 0"),

@@ -222,7 +222,7 @@ def test_planar_poses_are_judged(recorded):
     assert recorded(planar(turn, "", 180.0 / np.pi), *stated)[0] == 0
     status, record = recorded(planar(turn, "", -1.0), *PLANAR)
     assert status == 1
-    assert "read as euler 3 inverted the gap is within" in record["message"]
+    assert "Read as euler 3 inverted the gap is within" in record["message"]
 
 
 RATES = {
