@@ -132,6 +132,16 @@ def test_digits_of_wrong_recording_fail(recorded, form):
     assert (status, record["errors"]["x"]["position"]["worst_step"]) == (1, 10)
 
 
+def test_sign_with_unit_names_option(recorded):
+    turn = GRIDS["few"]
+    place, swing = closed_form(turn)
+    text = text_of(digits(9), turn, place * [1.0, -1.0], swing).replace("y [mm]", "Y")
+    status, record = recorded(text, "--map", "y=Y [m]")
+    assert status == 1
+    assert 'If it is meant, say --map "y=-Y [mm]"' in record["message"]
+    assert recorded(text, "--map", "y=-Y [mm]")[0] == 0
+
+
 def test_driver_that_somebody_set(recorded):
     """Numbers of one or two digits are exact beside outputs of more."""
     turn = np.array([0.0, 0.3, 0.7, 1.2, 1.9])
