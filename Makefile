@@ -7,15 +7,21 @@ PYTHON ?= python3
 BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null)
 
-.PHONY: run test board nightly docs lock sizes house mutants fuzz clean
+.PHONY: run test types tests board nightly docs lock sizes house mutants fuzz clean
 
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
 
+# One process checks the types, beside the tests.
 test: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(MAKE) --jobs 2 types tests
+
+types: .venv/ready
 	$(BIN)/pyright --pythonpath $(BIN)/python
+
+tests: .venv/ready
 	$(BIN)/pytest --numprocesses auto --dist worksteal
 
 # Three closed loops in four engines: half a minute. An engine that is not installed is named.

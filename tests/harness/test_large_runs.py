@@ -66,6 +66,7 @@ def test_large_run_by_workers_resumes(path, size):
     check_resumed(path, size, "--jobs", "2")
 
 
-@pytest.mark.parametrize("size", ["4x2", pytest.param("400x5", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("size", ["4x2", "400x5"])
 def test_large_run_by_cluster_resumes(cluster, path, size):
     check_resumed(path, size, "--scheduler", cluster.scheduler_address)

@@ -43,6 +43,7 @@ def ends(document):
     return [(each["from"], each["to"], each["kind"], each["right"]) for each in document["changes"]]
 
 
+@pytest.mark.nightly
 def test_twelve_releases_name_their_changes(offline):
     twelve(offline / "wheels")
     status, document = found("crank.toml", "--from", "1.0", "--to", "12.0", "--out", "site")
@@ -75,6 +76,7 @@ def test_undone_change_is_found_by_every(offline, capsys):
     assert (status, [each[:2] for each in ends(document)]) == (1, [("2.0", "3.0"), ("3.0", "4.0")])
 
 
+@pytest.mark.nightly
 def test_odd_releases_are_told(offline, capsys):
     """Pre-releases, post-releases, dependencies, a crash, a loop without end, another Python."""
     texts = {
