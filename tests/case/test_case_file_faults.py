@@ -17,6 +17,14 @@ BROKEN = {
         ("axis = [1", "axes = [1"),
         "joints.guide.axes ... unknown key ... did you mean 'axis'",
     ),
+    "misspelt joint type": (
+        ('type = "translational"', 'tyep = "translational"'),
+        "joints.guide.tyep ... unknown key; did you mean 'type'?",
+    ),
+    "misspelt output type": (
+        ("[outputs.tip_x]\n", '[outputs.tip_x]\njoint = "guide"\ntyep = "joint_force"\n'),
+        "outputs.tip_x.tyep ... unknown key ... did you mean 'type'?",
+    ),
     "unknown key far off": (
         ("atol = 1e-9", "atol = 1e-9\nqqq = 1"),
         "outputs.tip_x.qqq ... unknown key ... remove it",

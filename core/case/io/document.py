@@ -435,16 +435,20 @@ class Section:
             CaseError: the value is no table, or has such a key.
         """
         known = [*known]
-        for name in self.table:
-            if name not in known:
-                close = similar(name, known)
-                further = not self.key and isinstance(self.table[name], dict)
-                remove = f"remove it{', or install the extension that reads it' * further}"
-                advice = f"did you mean {close!r}?" if close else remove
-                raise self.at(name).fault(
-                    f"unknown key, expected {'one of ' * (len(known) > 1)}{', '.join(known)};"
-                    f" {advice}"
-                )
+        unknown = [name for name in self.table if name not in known]
+        if not unknown:
+            return
+        # a misspelt type is why others seem unknown
+        name = ("type" in known and similar("type", unknown)) or next(
+            (name for name in unknown if similar(name, known)), unknown[0]
+        )
+        close = similar(name, known)
+        further = not self.key and isinstance(self.table[name], dict)
+        remove = f"remove it{', or install the extension that reads it' * further}"
+        advice = f"did you mean {close!r}?" if close else remove
+        raise self.at(name).fault(
+            f"unknown key, expected {'one of ' * (len(known) > 1)}{', '.join(known)}; {advice}"
+        )
 
     @property
     def table(self) -> dict[str, Any]:
@@ -472,6 +476,8 @@ class Section:
         """
         expected = f"{with_article(what)} type"
         if "type" not in self.table:
+            if wrong := similar("type", self.table):
+                raise self.at(wrong).fault("unknown key; did you mean 'type'?")
             raise self.at("type").fault(
                 f"missing, expected {expected}; add it, one of {', '.join(known)}"
             )

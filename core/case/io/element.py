@@ -365,15 +365,12 @@ class Apart:
         format_name: for messages.
         names: attributes, and tags of elements in pointed brackets, by the tag of the element they
             are in, or by two tags, "equality joint"; those of "" are anywhere.
-        components: tags in pointed brackets whose elements are counted by name; others
-            are settings, of which a format has many.
         extended: elements in which programs put their own attributes and elements, which are
             counted.
     """
 
     format_name: str
     names: Mapping[str, Collection[str]]
-    components: Collection[str] = ()
     extended: Collection[str] = EXTENDED
 
 
@@ -416,7 +413,7 @@ def settle(root: Element, apart: Apart) -> Account:
         if "".join(element.texts).strip():
             unread = TEXT not in element.marks
             read, left = read + (not unread), left + unread
-            left_out["texts that have no meaning"] += unread
+            left_out[f"text of {element.tag}"] += unread
         inside: list[tuple[str, Element]] = []
         for child in element.children:
             tag = f"<{child.tag}>"
@@ -432,8 +429,8 @@ def settle(root: Element, apart: Apart) -> Account:
             foreign = extended and ":" in child.tag and not similar(child.tag, alike, ALIKE)
             if tag not in known and not foreign:
                 raise element.unknown_child(child, alike)
-            if foreign or tag in apart.components:
-                left_out[child.tag] += 1
+            # a plain setting says nothing that its table of names does not
+            left_out[child.tag] += foreign or bool(child.children or child.attributes)
         waiting += inside[::-1]
     return Account(read, left, +left_out)
 

@@ -50,7 +50,7 @@ from .table import (
 )
 from .templates import ROLES, agree, compact, corner_of, head_of_corner, kind_of_head
 from .tree import FEWEST, add_fact, axis_of, is_assignments, read_assignments
-from .words import fact_of
+from .words import fact_of, require_no_slip
 
 COMMENTS = ("#", "%", "//")
 HEAD = ("name", "x", "y", "z")
@@ -114,6 +114,7 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
         bare = comment.strip('" \t\r').lstrip("".join(COMMENTS)).rstrip(f'"{DELIMITERS}')
         if fact := fact_of(_SIGNS.sub(",", bare)):
             add_fact(file, "", facts, fact)
+        require_no_slip(file, f"line {text.splitlines().index(comment) + 1}", bare)
         remarks += fact is None and bool(bare.strip())
     lines = [
         (f"line {k}", line)

@@ -38,7 +38,7 @@ from .table import (
     wanted_corner,
 )
 from .templates import ROLES, TEMPLATE_NAMES, agree, compact, corner_of, normal
-from .words import fact, fact_of
+from .words import fact, fact_of, require_no_slip
 
 FEWEST = 3
 """Fewest points, rows or assignments to recognise a form."""
@@ -181,8 +181,10 @@ def facts_of_comments(file: Path, text: str) -> dict[str, str]:
     """
     facts = dict[str, str]()
     for k, line in enumerate(text.splitlines(), 1):
-        if line.lstrip().startswith("#") and (fact := fact_of(line.strip())):
-            add_fact(file, f"line {k}", facts, fact)
+        if line.lstrip().startswith("#"):
+            if fact := fact_of(line.strip()):
+                add_fact(file, f"line {k}", facts, fact)
+            require_no_slip(file, f"line {k}", line)
     return facts
 
 

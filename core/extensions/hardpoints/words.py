@@ -12,9 +12,10 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from ...case.io.document import decimal
+from ...case.io.document import decimal, fault, shown
 from ...case.io.table import folded, numeral, read_unit
 from ...case.units import LENGTHS
+from ...errors import similar
 from .table import STATIC_ANGLES, is_axes, length_name
 from .templates import TEMPLATE_NAMES, compact, corner_of, normal, side_of
 
@@ -26,6 +27,8 @@ _FACTS: Mapping[str, str] = {
 }
 _FACT = re.compile(r"#?\s*([^:=,：;]+?)\s*(?:[\[(]([^\])]*)[\])])?\s*[:=,：;]+\s*(.+)")
 _MEASURE = re.compile(r"([-+−]?(?:\d+[.,]?\d*|[.,]\d+))[\s,;]*[\[(]?([^\d\s,;\])]*)[\])]?")
+# Two words are one with a typing error.
+_SLIP = 0.75
 # Shorter words stand by themselves, unless they are Chinese.
 SHORT = 3
 _PARTS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[^\W_]+")
@@ -101,6 +104,28 @@ def fact_of(text: str) -> tuple[str, str] | None:
     """
     found = _FACT.fullmatch(text.strip())
     return fact(found[1], f"{found[3].strip()} {found[2] or ''}".strip()) if found else None
+
+
+def require_no_slip(file: Path, where: str, comment: str) -> None:
+    """Refuse a comment that states a fact by a misspelt name, "wheel_raduis: 300 mm", or a known
+    one by no measure: the fact would be missing without a word.
+    """
+    found = _FACT.fullmatch(comment.strip())
+    if found is None or fact_of(comment):
+        return
+    key, value = normal(found[1]), found[3].strip()
+    close = similar(key, (each for each in _FACTS if abs(len(each) - len(key)) <= 1), _SLIP)
+    name = _FACTS.get(close, "")
+    measured = name in (*STATIC_ANGLES, "wheel_radius") and re.match(r"[-+−]?[.,]?\d", value)
+    plain = (name == "unit" and value in LENGTHS) or (name == "axes" and is_axes(value))
+    if measured or plain or (name == "template" and compact(value) in TEMPLATE_NAMES):
+        expected = f"{close!r}" if close != key else "a number with its unit"
+        raise fault(
+            file,
+            where,
+            f"found {shown(comment.strip())}, expected {expected}. Correct it, or write it without"
+            " a colon",
+        )
 
 
 def fact(key: str, value: str) -> tuple[str, str] | None:

@@ -200,7 +200,9 @@ function remembered(key, text) {
       parts.scene.change(drawing, motionOf(drawing));
       say(`${state.answer.solved.length} samples`);
     };
-    parts.sliders = sliders(one("#sliders"), opening.drivers, { moved, sweep, refuse: trouble });
+    const distance = opening.engines.length > 0;
+    const does = { moved, sweep, refuse: trouble, distance };
+    parts.sliders = sliders(one("#sliders"), opening.drivers, does);
     state.asked = performance.now();
     link.ask("solve", { type: "solve", points: [] });
   }

@@ -410,10 +410,10 @@ class Conversation:
         if isinstance(message, Export):
             ending = "html" if message.kind == "report" else message.kind
             name = f"{live.file.stem}.{ending}"
-            self.tell(Exported(id=message.id, name=name, content=_file(results, case, name)))
+            self.tell(Exported(id=message.id, name=name, content=file_of(results, case, name)))
 
 
-def _file(results: Results, case: Case, name: str) -> bytes:
+def file_of(results: Results, case: Case, name: str) -> bytes:
     """Return the report or the curves of results."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / name

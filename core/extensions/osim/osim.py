@@ -96,10 +96,13 @@ APART = Apart(
         ),
         "TransformAxis": ("<coordinates>", "<axis>"),
     },
-    components=("<PhysicalOffsetFrame>",),
     extended=("Model",),
 )
 """Names of OpenSim without meaning for kinematics."""
+EXPRESSION = "ExpressionBasedPointToPointForce"
+_NUMBER = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)"
+# A spring and a damper, as kincheck writes them.
+_LINE = re.compile(rf"{_NUMBER}\*\(d-{_NUMBER}\)\+{_NUMBER}\*ddot")
 _NAMED = re.compile(r"\w*(?:Joint|Constraint|Body|Force|Spring|Actuator|Damper)")
 _INSIDE = ("objects", "components", "frames", "coordinates", "Model")
 _TIED = (*words("BodySet JointSet ConstraintSet ForceSet MarkerSet CoordinateSet FrameSet"),)
@@ -219,8 +222,8 @@ class _Reader:
         tree.gravity = x, y, z
         for section in self.model.children:
             if section.tag.endswith("Set") and section.tag not in _TIED:
-                for each in section.take().children:
-                    for other in each.take().children:
+                for each in section.take().findall("objects", "groups", "defaults"):
+                    for other in each.children:
                         tree.leave(other, other.tag)
             if section.tag == "components":
                 for other in section.take().children:
@@ -508,6 +511,12 @@ class _Reader:
                 self._add_bushing(each)
             elif each.tag == "PointToPointSpring":
                 self._add_spring(each)
+            elif each.tag == EXPRESSION and (
+                found := _LINE.fullmatch(each.child_text("expression"))
+            ):
+                stiffness, length, damping = map(float, found.groups())
+                ends = self._ends(each, "body{}", "point{}")
+                self._add_strut(each, *ends, Spring(stiffness, damping, length))
             else:
                 if each.tag.endswith("CoordinateActuator"):
                     tree.add_motor(each.tag, {coordinate} & self.values.keys())
@@ -566,11 +575,10 @@ def _prescribed(coordinate: Element) -> Element | None:
     Raises:
         CaseError: it has several.
     """
-    around = coordinate.child("prescribed_function")
-    if around is None:
+    if not _flag(coordinate, "prescribed"):
         return None
-    if not _flag(coordinate, "prescribed") or not around.children:
-        around.leave()
+    around = coordinate.child("prescribed_function")
+    if around is None or not around.children:
         return None
     if len(around.children) > 1:
         raise around.fault("found several functions, expected one; remove the others")

@@ -8,6 +8,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from ...case.case import Case
 from ...case.io.element import Element, printed_digits
 from ...case.models.files import load
@@ -18,13 +20,15 @@ from ..trees.case import undriven_mechanism
 from ..trees.gluing import glue
 from ..trees.laws import Laws, laws_of, tendons_of
 from ..trees.reader import is_model, read_tree, root_of
-from ..trees.tree import NO_LIMIT, Limit, Strut
+from ..trees.tree import NO_LIMIT, Limit, Move, Spring, Strut, Tree
 
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
 _PARTS = 12
 _ANGLE = re.compile(r"[-+]?\d*\.\d{2,}")
 # Elements of SDF and USD that have it.
 _SCENES = ("world", "PhysicsScene")
+# Cosine of the angle between a spring and a slide, by printed digits.
+_PARALLEL = 1e-12
 # A name's ends that programs add to those of links.
 _ENDS = ("_link", "-link", " link", "link_")
 
@@ -138,6 +142,8 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
         if move.is_axial
     }
     digits = printed_digits(root)
+    tendons = tendons_of(tree)
+    _give_to_slides(tree)
     return Undriven(
         file.name,
         mechanism,
@@ -153,10 +159,37 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
         root=root.tag,
         laws=laws_of(tree, root),
         struts=tree.struts,
-        tendons=tendons_of(tree),
+        tendons=tendons,
         notes=[f"{file.name}: {note}" for note in tree.notes],
         without=tree.without,
     )
+
+
+def _give_to_slides(tree: Tree) -> None:
+    """Make springs between two points along a slide those of its coordinate: formats without
+    springs of joints have them so.
+    """
+    between: dict[frozenset[str], list[Move]] = {}
+    for move in tree.moves.values():
+        between.setdefault(frozenset((move.outer, move.inner)), []).append(move)
+    kept: list[Strut] = []
+    for strut in tree.struts:
+        moves = between.get(frozenset(strut.links), [])
+        first, second = (np.array([*each.at]) for each in strut.places)
+        slide, way = moves[0] if len(moves) == 1 else None, second - first
+        length = float(np.linalg.norm(way))
+        if slide is None or slide.kind != "slide" or not isinstance(strut.spring, Spring):
+            kept.append(strut)
+            continue
+        along = float(way @ np.array([*slide.axis])) * (1 if strut.links[1] == slide.inner else -1)
+        if abs(along) < (1.0 - _PARALLEL) * length or not length:
+            kept.append(strut)
+            continue
+        rest = slide.value + math.copysign(1.0, along) * (strut.spring.rest - length)
+        own = Spring(strut.spring.stiffness, strut.spring.damping, rest)
+        others = tree.springs.get(slide.name)
+        tree.springs[slide.name] = own if others is None else own.beside(others)
+    tree.struts = kept
 
 
 def _angle_error(element: Element) -> float:

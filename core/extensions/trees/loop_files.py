@@ -233,7 +233,8 @@ def read_loop_files(root: Element) -> LoopFiles:
     frames = joints | {each.attributes.get("name", "") for each in root.findall("link")}
     found: list[tuple[Path, PairsFile]] = []
     notes: list[str] = []
-    for paired in _paired(file):
+    beside = _paired(file)
+    for paired in beside:
         pairs, unread = _pairs(paired)
         if pairs.links and not pairs.links & frames:
             notes.append(f"{paired.name} beside it is of other links, and not read")
@@ -253,11 +254,10 @@ def read_loop_files(root: Element) -> LoopFiles:
             types[name] = _TYPES.get(kind, kind.removeprefix("UJOINT_"))
         types |= dict.fromkeys(pairs.ball_upgrades, "spherical")
         found.append((paired, pairs))
-    read = {own, *(each for each, _ in found)}
     notes += [
         f"{WARNING}{each} beside it may close loops, and is not read; write them as <constraint>"
         for each in _others(file)
-        if file.parent / each not in read
+        if file.parent / each not in {own, *beside}
     ]
     return LoopFiles(constraints, found, types, notes)
 
@@ -274,13 +274,22 @@ def _paired(file: Path) -> list[Path]:
 def _others(file: Path) -> list[str]:
     """Return the names of other files beside a URDF, by which they may hold its loops."""
     try:
-        names = [each.name for each in os.scandir(file.parent)]
+        names = [each.name for each in os.scandir(file.parent) if each.is_file()]
     except OSError:
         return []
     stem = re.escape(file.stem)
-    word = r"(?:loop|closure|closed|constraint)\w*"
-    other = re.compile(rf"(?:{stem}[._-])?{word}\.(?:ya?ml|json|toml)")
-    return sorted(name for name in names if other.fullmatch(name))
+    data = r"\.(?:ya?ml|json|toml)"
+    other = re.compile(rf"{stem}{data}|.*(?:loop|closure|closed|constraint).*{data}", re.IGNORECASE)
+    robots = [Path(name).stem for name in names if name.endswith(file.suffix)]
+
+    def is_own(name: str) -> bool:
+        owner = max((each for each in robots if name.startswith(each)), key=len, default=file.stem)
+        if owner != file.stem:
+            return False
+        with (file.parent / name).open("rb") as data:  # what kincheck writes begins with its schema
+            return b"kincheck-" not in data.read(200)
+
+    return sorted(name for name in names if other.fullmatch(name) and is_own(name))
 
 
 def _text(file: Path) -> str:

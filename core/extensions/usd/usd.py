@@ -77,6 +77,8 @@ SCHEMAS = words(
 _VENDORS = ("Physx", "Newton", "Mjc")
 _PLAIN = ("def", "Xform", "Scope")
 _OF_READER = words("name path apis matrix variants")
+# Of whatever may be drawn.
+_SEEN = words("visibility purpose extent proxyPrim")
 # These name bodies that they do not join.
 _APART = words(
     "collection material proxyPrim skel isaac physics:filteredPairs physics:filteredGroups"
@@ -188,7 +190,8 @@ class _Reader:
                 if last != name and last not in APART:
                     known = {*IN_JOINT, *IN_BODY, *APART}
                     raise element.unknown_attribute(name, sorted(known), "USD")
-                if last == name and ":" in name:
+                other = ":" in name or (element.tag in (*_PLAIN, *PHYSICS) and name not in _SEEN)
+                if last == name and other:
                     tree.left_out[f"{name} of {element.tag}"] += moves
                 found.add(name)
         tree.left_out = +tree.left_out

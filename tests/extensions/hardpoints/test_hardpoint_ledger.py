@@ -130,3 +130,28 @@ def test_contradicting_facts_are_refused(name, tmp_path):
     text = "name,x,y,z\na,1,2,3\n" if name == "car.csv" else assigned
     with pytest.raises(CaseError, match="found unit 'm', and 'mm' above, expected one"):
         read_hardpoints(write(tmp_path, facts + text, name), Supplied("mcpherson"))
+
+
+@pytest.mark.parametrize("name", ["car.csv", "car.toml"])
+def test_misspelt_fact_of_comment_is_refused(name, tmp_path):
+    points = (
+        "name,x,y,z\na,1,2,3\n"
+        if name == "car.csv"
+        else "a = [1, 2, 3]\nb = [2, 3, 4]\nc = [1, 2, 5]\n"
+    )
+
+    def read(comment):
+        file = write(tmp_path, f"# about\n# {comment}\n{points}", name)
+        return read_hardpoints(file, Supplied("mcpherson"))
+
+    for slip, right in {
+        "wheel_raduis: 300 mm": "'wheel_radius'",
+        "statik toe: 0.2": "'static_toe'",
+        "unti: mm": "'unit'",
+        "templaet: mcpherson": "'template'",
+        "wheel radius: 300 ells": "a number with its unit",
+    }.items():
+        with pytest.raises(CaseError, match=f"line 2: found .*{slip}', expected {right}"):
+            read(slip)
+    for remark in ("wheels: 4", "toe link: 300", "units: see sheet 2", "wheel radius: as drawn"):
+        assert len(read(remark).points) > 0

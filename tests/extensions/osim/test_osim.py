@@ -14,6 +14,7 @@ from kincheck.core.extensions.exports import model_writer
 from kincheck.core.extensions.exports.command import writer_of
 from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.trees.reader import read_tree
+from kincheck.core.extensions.trees.tree import Spring
 from scipy.spatial.transform import Rotation
 
 from ...support import case_texts
@@ -325,6 +326,16 @@ def test_masses_springs_limits_and_markers(write):
     found = undriven_file(file).coordinates["A"]
     assert (found.limit.lower, found.limit.upper, found.actuated) == (-0.5, 0.75, True)
     assert load(file).sweep.driver == "A"
+    of_export = """<ExpressionBasedPointToPointForce name="e"><body1>/ground</body1>
+        <body2>/bodyset/a</body2><point1>0 1 0</point1>
+        <expression>20*(d-1.5)+{}*ddot</expression></ExpressionBasedPointToPointForce>"""
+    tree = read_tree(write(model(["a"], [pin], forces=of_export.format(2e-3))))
+    (strut,) = tree.struts
+    assert strut.spring == Spring(20.0, 2e-3, 1.5)
+    assert tree.gravity == (0.0, -9.80665, 0.0)
+    other = read_tree(write(model(["a"], [pin], forces=of_export.format("2*d"))))
+    assert not other.struts
+    assert other.left_out == {"ExpressionBasedPointToPointForce": 1}
 
 
 WHOLE = model(

@@ -1,12 +1,14 @@
 """kincheck same: files of one mechanism in several formats, and planted differences by hand."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from kincheck import cases
 from kincheck.core import Body, JointDisplacement, Mechanism, Translational
+from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.exports.command import writer_of
 from kincheck.core.extensions.exports.model_writer import written
@@ -14,6 +16,8 @@ from kincheck.core.extensions.same.undriven import undriven_case, undriven_file
 from kincheck.core.extensions.same.verdict import compare
 
 from ... import converters
+from ...support.case_texts import write
+from ...support.model_files import driven
 from ...support.written_mechanisms import CASES, case
 
 LIMIT = '<limit lower="-0.2" upper="0.8" effort="5" velocity="2"/>'
@@ -259,3 +263,31 @@ def test_same_reports_unreadable_file_as_json(tmp_path, capsys):
     assert found["verdict"] == "not judged"
     assert "no such file" in found["reason"]
     assert found["poses"] == 0
+
+
+SLIDE = """<mujoco><worldbody><body name="a"><joint name="ja" axis="0 1 0"/>
+<inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.1 0.1"/><body name="c" pos="0.5 0 0">
+<joint name="jc" type="slide" axis="1 0 2" stiffness="20" damping="3" springref="0.1"/>
+<inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("form", ["mjcf", "osim", "sdf", "urdf"])
+def test_spring_of_slide_is_same_between_points(form, tmp_path):
+    """Formats have it between two points, or an export writes it so."""
+    first = write(tmp_path, SLIDE, "first.xml")
+    texts = written(load(first, driven("ja:0:0.1:3", hold_rest=True)), writer_of(form), None)
+    if form == "osim":  # ends exchanged
+        change = {"1>": "2>", "2>": "1>"}
+        old = texts[".osim"]
+        texts = {".osim": re.sub(r"(?<=body|oint)[12]>", lambda x: change[x[0]], old)}
+        assert texts[".osim"] != old
+    files = [write(tmp_path, text, f"second{ending}") for ending, text in texts.items()]
+    second = undriven_file(next(file for file in files if file.suffix != ".json"))
+    found = compare(undriven_file(first), second, {})
+    assert found.verdict == "same"
+    assert not [each for each in found.lost if "limit" not in each]
+    softer = write(tmp_path, SLIDE.replace('"20"', '"10"'), "softer.xml")
+    found = compare(undriven_file(softer), second, {})
+    assert [each for each in found.lost if "limit" not in each] == [
+        "stiffness of jc: 10 against 20"
+    ]

@@ -26,7 +26,23 @@ MODELS = int(os.environ.get("KINCHECK_MODELS", "1"))
 PLACES = 8 * MODELS
 NAME = "zq_unknown"
 XML = {kind: write_as for kind, write_as in FORMATS.items() if kind != "USD"}
-FIXED = {"OpenSim": {"osim": osim_texts.FOUR_BAR}, "gripper": {"xml": GRIPPER.read_text()}}
+OSIM = osim_texts.model(
+    ["<Body name='a'><FrameGeometry><scale_factors>1 1 1</scale_factors></FrameGeometry></Body>"],
+    [
+        osim_texts.joint(
+            *("PinJoint", "A", "", "a"),
+            osim_texts.coordinate(
+                "A", inside="<prescribed_function><Constant/></prescribed_function>"
+            ),
+        )
+    ],
+    more="<ControllerSet><objects/><groups/></ControllerSet>",
+)
+FIXED = {
+    "OpenSim": {"osim": osim_texts.FOUR_BAR},
+    "OpenSim with settings": {"osim": OSIM},
+    "gripper": {"xml": GRIPPER.read_text()},
+}
 HAS_USD = importlib.util.find_spec("pxr") is not None
 
 
@@ -186,6 +202,7 @@ def test_planted_usd_is_named(tmp_path):
         for line, always in (
             (f"float physics:{NAME} = 1", True),
             (f"float acme:{NAME} = 1", moves),
+            (f"custom float {NAME} = 1", moves),
             (f"float2 physics:{NAME} = (1, 2)", True),
             (f'token[] acme:{NAME} = ["a"]', moves),
             (f'def Physics{NAME} "p" {{}}', True),

@@ -78,11 +78,16 @@ def test_closures_of_others_are_noted(tmp_path):
     other = CLOSURE.replace("coupler", "p").replace("rocker", "q")
     (tmp_path / "loop_closures.yaml").write_text(other)
     (tmp_path / "robot.yaml").write_text("controller: {p: 1}")
-    (tmp_path / "closed_loops.json").write_text("{}")
+    unread = ("closed_loops.json", "robot.json", "kinematic-Loops.toml", "robot_two.txt")
+    others = ("robot_two.urdf", "robot_two_loops.json")
+    for name in (*unread, *others):
+        (tmp_path / name).write_text("{}")
+    (tmp_path / "robot.toml").write_text('schema = "kincheck-case/1"\n')
     notes = load(file, driven("A:0:0.5:3", hold_rest=True)).assembly
     assert "loop_closures.yaml beside it is of other links, and not read" in notes
     assert "robot.yaml: not read: controller" in notes
-    assert any("closed_loops.json beside it may close loops" in each for each in notes)
+    said = [each.split(" beside")[0] for each in notes if "beside it may close loops" in each]
+    assert [each.removeprefix("warning: ") for each in said] == sorted(unread[:3])
     assert any(each.startswith("warning: held by --hold-rest") for each in notes)
 
 
