@@ -80,6 +80,11 @@ def test_same_motion_names_lost_facts(text, lost, tmp_path):
     assert bool(found["lost"]) == bool(lost)
 
 
+def test_radians_for_degrees_are_named(tmp_path):
+    degrees, unit = SAME["degrees"]
+    assert unit in "; ".join(against(tmp_path, GRIPPER, first=degrees)["lost"])
+
+
 DIFFERENT = {
     "no mimic": (GRIPPER.replace(MIMIC, ""), "freedom 1 against 2: right.mimic in a.urdf only"),
     "sense of the mimic": (GRIPPER.replace('"-1"', '"1"'), "right.mimic"),
