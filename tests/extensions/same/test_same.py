@@ -277,7 +277,7 @@ SLIDE = """<mujoco><worldbody><body name="a"><joint name="ja" axis="0 1 0"/>
 
 
 @pytest.mark.parametrize("form", ["mjcf", "osim", "sdf", "urdf"])
-def test_spring_of_slide_is_same_between_points(form, tmp_path):
+def test_spring_of_slide_between_points(form, tmp_path):
     """Formats have it between two points, or an export writes it so."""
     first = write(tmp_path, SLIDE, "first.xml")
     texts = written(load(first, driven("ja:0:0.1:3", hold_rest=True)), writer_of(form), None)
