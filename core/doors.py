@@ -54,6 +54,8 @@ class Extension:
         formats: who reads each format, for the help.
         converters: function from a model's file to the text saved by a simulator.
         views: HTML of a result or a mechanism in a notebook.
+        proposals: function for the least moves of places that bring outputs of a case into bands;
+            see `live.table`.
         styles: formulation of a mechanism in each row style; see `kinematics.formulation.styles`.
         steppers: script of each stepper of free motion; see `adapters.steppers.scripts`.
     """
@@ -77,6 +79,7 @@ class Extension:
     formats: _Table = field(default_factory=dict[str, str])
     converters: _Table = field(default_factory=dict[str, str])
     views: _Table = field(default_factory=dict[str, str])
+    proposals: _Table = field(default_factory=dict[str, str])
     styles: _Table = field(default_factory=dict[str, str])
     steppers: _Table = field(default_factory=dict[str, str])
 

@@ -158,7 +158,8 @@ def _print_trends(history: History) -> None:
     console = page(None)
     for (case, engine, mode), entries in history.pairs.items():
         rows = [history.runs[entry.run] for entry in entries]
-        errors = [largest_errors(entry, row) for entry, row in zip(entries, rows, strict=True)]
+        told = zip(entries, rows, strict=True)
+        errors = [largest_errors(entry, row, rows[-1]) for entry, row in told]
         units = [*dict.fromkeys(unit for each in errors for unit in each)] or ["m"]
         table = columns(
             "run",

@@ -155,18 +155,28 @@ def driver_unit(facts: Facts) -> str:
 
 
 def table_facts(case: Case) -> Facts:
-    """Return the units of a table of hardpoints and the type of its driver, as a part of the facts
-    of its case; empty for another file.
+    """Return the units of a table of hardpoints, or of another file that is not in SI, and the type
+    of its driver, as a part of the facts of its case; empty for a file in SI.
     """
     driver = case.sweep.driver
     kind = TIME if driver == TIME else case.mechanism.driver(driver).type
     units = {"length": case.length_unit, "angle": case.angle_unit}
-    return {"units": units, "driver": {"type": kind}} if case.hardpoints else {}
+    is_table, is_si = bool(case.hardpoints), [*units.values()] == ["m", "rad"]
+    if is_si and not is_table:
+        return {}
+    return {"units": units, "is_table": is_table, "driver": {"type": kind}}
+
+
+def is_table(facts: Facts) -> bool:
+    """Return whether a case is of a table of hardpoints; stored facts of old had units of tables
+    only.
+    """
+    return bool(facts.get("units")) and facts.get("is_table", True)
 
 
 def in_table_units(unit: str, facts: Facts) -> tuple[str, float]:
-    """Return the name of an SI unit in the units of a case of hardpoints, and its size [SI]. Rates
-    of change per metre stay per metre, and forces and torques in N and N m. Other cases are in SI.
+    """Return the name of an SI unit in the units of the file of a case, and its size [SI]. Rates
+    of change per metre stay per metre, and forces and torques in N and N m.
     """
     measure, *per = unit.split("/", 1)
     if "units" not in facts or measure not in ("m", "rad"):

@@ -213,7 +213,7 @@ def case_facts(case: Case) -> dict[str, Any]:
         if sweep.driver == TIME
         else _driver(case, sweep.driver) | {"rate": sweep.rate}
     )
-    units = table_facts(case).get("units")
+    own = table_facts(case)
     return {
         "source": case.source,
         "truth": truth_of(case),
@@ -226,7 +226,7 @@ def case_facts(case: Case) -> dict[str, Any]:
         "notes": notes(case),
         "outputs": {output.name: dict(output.facts) for output in case.outputs},
         **({"formerly": list(case.formerly)} if case.formerly else {}),
-        **({"units": units} if units else {}),
+        **{key: own[key] for key in ("units", "is_table") if key in own},
     }
 
 

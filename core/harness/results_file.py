@@ -37,7 +37,7 @@ class _Driver(msgspec.Struct, frozen=True):
 
 
 class _Units(msgspec.Struct, frozen=True):
-    """The units of a table of hardpoints."""
+    """The units of a table of hardpoints, or of another file that is not in SI."""
 
     length: Literal["m", "mm", "cm", "inch", "foot"]
     angle: Literal["rad", "deg"]
@@ -53,6 +53,7 @@ class _About(msgspec.Struct):
     motions: dict[str, _Driver] = {}
     outputs: dict[str, dict[str, Any]] = {}
     units: _Units | None = None
+    is_table: bool = True
 
 
 _FACTS: Mapping[str, Any] = {

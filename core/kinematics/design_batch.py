@@ -98,9 +98,17 @@ def solve_variants(route: Route, geometry: Array, tol: float, *, alone: bool = T
         tol: as for `solve`.
         alone: whether to solve variants alone that fail in parts of steps too, which takes a
             hundred times as long; otherwise they end there.
+
+    Raises:
+        SolveError: the model has no varied place, or the geometry another shape.
     """
     _recycle()
-    model = route.model
+    model, numbers = route.model, len(route.model.geometry)
+    if not numbers or not geometry.size or len(geometry) != numbers:
+        raise SolveError(
+            f"designs: found numbers of shape {geometry.shape}, expected ({numbers}, designs), a"
+            " row for each number of the varied places; vary one place at least"
+        )
     kept, closes, worst = _together(route, geometry, tol)
     closure, sigma = (kept[model.rows[name].start] for name in ("closure", SIGMA))
     solved = np.ones(closure.shape, dtype=np.bool_)

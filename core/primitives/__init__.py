@@ -1,7 +1,11 @@
 """Primitive constraints: one geometric condition a file, its derivation on top.
 
-Where the paper's equations are. Each file has its native, paper (body axes) and conventional rows
-one below the other; tests/oracles/naive.py has the equations unsimplified.
+A primitive says its residual phi, and which of its zeros is meant (branch). Rows, gamma and nu are
+derived from phi and take as many operations as written by hand. Written are those that the paper
+simplifies: of dot11, dot12, the named turn and the driven angle, a third of the strut's program.
+
+Where the paper's equations are; core/extensions/laboratory/paper has its rows in body axes and
+conventional ones, tests/oracles/naive.py the equations unsimplified.
 
     (1)-(7)     A(p), virtual rotations, velocities     algebra.py, base.py
     (8)-(12)    dot10         Table 1                   dot10.py

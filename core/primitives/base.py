@@ -18,7 +18,7 @@ matrix products are in `core.extensions.laboratory.paper.rows`, to measure the p
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, NamedTuple, cast
@@ -35,10 +35,11 @@ from ..algebra import (
     Y,
     Z,
     cross,
+    quat,
     rotation_less_identity,
     vec,
 )
-from ..program.tape import Gradient, Tape, Traced, changes, folded
+from ..program.moving import Moving, changes_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,7 @@ class Pose:
 
     def turn(self, a: Vec3) -> Vec3:
         """Return A a: a body-fixed vector now, global axes."""
-        return a + self.D @ a
+        return a + self.swing(a)
 
     @property
     def A(self) -> Mat3:
@@ -139,30 +140,24 @@ class Primitive(ABC):
         """Return the rows of the Jacobian; by default the derivative of phi, without the terms that
         a simplified row leaves out.
         """
-        traced = _Derivation(self, i, j)
-        vectors = [
-            vec(traced.values([slopes.get(k + part, 0.0) for part in range(3)]))
-            for slopes in changes(traced.tape, traced.phi, traced.slopes)
-            for k in range(0, 12, 3)
-        ]
-        return tuple(Row(*vectors[k : k + 4]) for k in range(0, len(vectors), 4))
+        lifted = _Derivation(self, i, j)
+        return tuple(map(lifted.row, lifted.phi))
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Return the right-hand sides of the acceleration equations: required values of rows .
         acceleration; by default from the derivative of rows and nu.
         """
-        traced = _Derivation(self, i, j, vi, vj)
+        inner = _Derivation(self, i, j)
+        pair, own = inner.pair, inner.primitive
         if type(self).rows is Primitive.rows:
-            speeds = traced.rates(traced.phi)
+            outer = _Derivation(own, *pair)
+            speeds = outer.rates(outer.phi, vi, vj)
         else:
-            pair = traced.i, traced.j
             speeds = [
-                row.part("i", traced.vi) + row.part("j", traced.vj) - value
-                for row, value in zip(
-                    traced.primitive.rows(*pair), traced.primitive.nu(*pair), strict=True
-                )
+                row.part("i", vi) + row.part("j", vj) - value
+                for row, value in zip(own.rows(*pair), own.nu(*pair), strict=True)
             ]
-        return tuple(-x for x in traced.values(traced.rates(speeds)))
+        return tuple(-x for x in inner.rates(speeds, vi, vj))
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         """Return the right-hand sides of the velocity equations: zero unless driven, linear in the
@@ -170,8 +165,8 @@ class Primitive(ABC):
         """
         if not hasattr(self, "drive"):
             return (0.0,) * self.n
-        traced = _Derivation(self, i, j)
-        return tuple(-x for x in traced.values(traced.rates(traced.phi)))
+        lifted = _Derivation(self, i, j)
+        return tuple(-x for x in lifted.rates(lifted.phi, GROUND_TWIST, GROUND_TWIST))
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         """Return numbers that are positive on the intended branch of phi = 0; empty without
@@ -180,94 +175,97 @@ class Primitive(ABC):
         return ()
 
 
-class _Derivation:
-    """A primitive and the motion of its bodies as inputs of a tape of its own, to differentiate its
-    equations by their operations.
+class _Lifted(Pose):
+    """A pose of body "i" or "j" in a derivation: its numbers move, and each vector turned by it.
 
     Attributes:
-        slopes: derivatives of the inputs of poses by (dr_i, dpi_i, dr_j, dpi_j).
-        speeds: derivatives of the inputs by time, at constant velocities.
+        turned: these vectors, by their keys.
     """
 
-    def __init__(
-        self,
-        primitive: Any,
-        i: Pose,
-        j: Pose,
-        vi: Twist = GROUND_TWIST,
-        vj: Twist = GROUND_TWIST,
-    ) -> None:
-        self.tape = Tape()
-        self.given: dict[int, Scalar] = {}
-        self.i, self.j = (
-            Pose(
-                self._vector(p.u),
-                Quat(self._input(p.q.e0), self._vector(p.q.e)),
-                Mat3(*map(self._vector, p.D)),
-            )
-            for p in (i, j)
-        )
-        self.vi, self.vj = (Twist(self._vector(t.v), self._vector(t.w)) for t in (vi, vj))
-        motion = [x for t in (self.vi, self.vj) for a in (t.v, t.w) for x in a]
-        self.slopes: dict[Traced, Gradient] = {}
-        for first, pose in ((0, self.i), (6, self.j)):
-            turned = [
-                [*(Quat(0.0, 0.5 * axis) * pose.q), *(x for c in pose.A.T for x in cross(axis, c))]
-                for axis in (X, Y, Z)
-            ]
-            self.slopes |= {x: {first + k: 1.0} for k, x in enumerate(pose.u)}
-            for x, *about in zip(
-                (*pose.q, *(x for c in pose.D.T for x in c)), *turned, strict=True
-            ):
-                self.slopes[x] = {first + 3 + k: slope for k, slope in enumerate(about)}
-        self.speeds: dict[Traced, Gradient] = {
-            x: {0: sum((k * motion[n] for n, k in slopes.items()), 0.0)}
-            for x, slopes in self.slopes.items()
+    body: str
+    given: Pose
+    turned: dict[Hashable, Vec3]
+    kept: list[Vec3]
+
+    def __init__(self, body: str, given: Pose) -> None:
+        numbers: dict[str, object] = {
+            "u": vec(_moving(given.u, body, "u")),
+            "q": quat(_moving(given.q, body, "q")),
+            "body": body,
+            "given": given,
+            "turned": {},
+            "kept": [],
         }
-        # numbers of other kinds are inputs too
-        self.primitive: Primitive = map_numbers(
-            primitive, lambda x: self._input(x) if _is_varied(x) else x, _is_varied
-        )
-        if hasattr(primitive, "drive"):
-            self.primitive = replace(self.primitive, drive=self._lift_drive(primitive.drive))
+        for name, value in numbers.items():
+            object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Mat3:
+        if name != "D":
+            raise AttributeError(name)
+        return Mat3(*map(self.swing, (X, Y, Z))).T  # few equations read it
+
+    def swing(self, a: Vec3) -> Vec3:
+        key, found = tuple(map(id, a)), self.given.swing(a)
+        self.turned[key] = a + found
+        self.kept.append(a)  # an identity is that of another number once this one is gone
+        return vec(_moving(found, self.body, key))
+
+
+class _Derivation:
+    """A primitive and the poses of its bodies as numbers that move: with u, with the Euler
+    parameters q, and with each vector that a body turns, whose change is a vector product with the
+    rotation. So derived equations have the operations of those written by hand.
+    """
+
+    def __init__(self, primitive: Any, i: Pose, j: Pose) -> None:
+        self.pair = _Lifted("i", i), _Lifted("j", j)
+        self.primitive: Primitive = primitive
+        self._drive: Drive | None = getattr(primitive, "drive", None)
+        if self._drive:
+            numbers = [getattr(self._drive, each.name) for each in fields(Drive)]
+            self.primitive = replace(primitive, drive=Drive(*_moving(numbers, "drive", "")))
 
     @property
     def phi(self) -> tuple[Scalar, ...]:
         """The residuals."""
-        return self.primitive.phi(self.i, self.j)
+        return self.primitive.phi(*self.pair)
 
-    def rates(self, values: Sequence[Scalar]) -> list[Scalar]:
-        """Return the derivatives of traced values by time, at constant velocities."""
-        return [each.get(0, 0.0) for each in changes(self.tape, values, self.speeds)]
+    def row(self, value: Scalar) -> Row:
+        """Return the derivatives of a number by (dr_i, dpi_i, dr_j, dpi_j)."""
+        by, found = changes_of(value), list[Vec3]()
 
-    def values(self, traced: Sequence[Scalar]) -> list[Scalar]:
-        """Return the traced scalars for the motion and the geometry that were given."""
-        return folded(self.tape, traced, self.given)
+        def of(*part: Hashable, count: int = 3) -> list[Scalar]:
+            return [by.get((*part, k), 0.0) for k in range(count)]
 
-    def _input(self, value: Scalar) -> Traced:
-        self.given[len(self.given)] = value
-        return self.tape.input(len(self.given) - 1)
+        used = {key[:2] for key in by}
+        for pose in self.pair:
+            about = ZERO
+            for key, arm in pose.turned.items():
+                if (pose.body, key) in used:
+                    about = about + cross(arm, vec(of(pose.body, key)))
+            if (pose.body, "q") in used:
+                g, q = quat(of(pose.body, "q", count=4)), pose.given.q
+                about = about + 0.5 * ((q.e0 * g.e - g.e0 * q.e) + cross(q.e, g.e))
+            found += vec(of(pose.body, "u")), about
+        return Row(*found)
 
-    def _vector(self, a: Vec3) -> Vec3:
-        return vec([*map(self._input, a)])
-
-    def _lift_drive(self, drive: Drive) -> Drive:
-        given = {each.name: self._input(getattr(drive, each.name)) for each in fields(drive)}
-        driven = Drive(**given)
-        half = 0.5 * driven.c_t
-        for x, speed in (
-            (driven.c, driven.c_t),
-            (driven.c_t, driven.c_tt),
-            (driven.half_cos, -driven.half_sin * half),
-            (driven.half_sin, driven.half_cos * half),
-        ):
-            self.speeds[x] = {0: speed}
-        return driven
+    def rates(self, values: Iterable[Scalar], vi: Twist, vj: Twist) -> list[Scalar]:
+        """Return the derivatives of numbers by time, at constant velocities."""
+        speeds: dict[tuple[str, Hashable], Iterable[Scalar]] = {}
+        for pose, twist in zip(self.pair, (vi, vj), strict=True):
+            speeds[pose.body, "u"] = twist.v
+            speeds[pose.body, "q"] = Quat(0.0, 0.5 * twist.w) * pose.given.q
+            speeds |= {(pose.body, key): cross(twist.w, a) for key, a in pose.turned.items()}
+        if drive := self._drive:
+            half = 0.5 * drive.c_t
+            turning = -drive.half_sin * half, drive.half_cos * half
+            speeds["drive", ""] = drive.c_t, drive.c_tt, 0.0, *turning
+        speed = {(*part, k): x for part, each in speeds.items() for k, x in enumerate(each)}
+        return [sum((slope * speed[k] for k, slope in changes_of(x).items()), 0.0) for x in values]
 
 
-def _is_varied(value: Any) -> bool:
-    """Return whether a value is a number of another kind, such as one of varied geometry."""
-    return hasattr(value, "__truediv__") and not isinstance(value, int | float | complex)
+def _moving(values: Iterable[Scalar], *part: Hashable) -> list[Moving]:
+    return [Moving(x, {(*part, k): 1.0}) for k, x in enumerate(values)]
 
 
 def map_numbers(

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import ZERO, Scalar, Vec3
-from .base import Pose, Primitive, Row, Twist
+from ..algebra import Scalar, Vec3
+from .base import Pose, Primitive
 from .dot10 import Dot10
 
 
@@ -43,14 +43,6 @@ class ConstantVelocity(Primitive):
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         (plus,), (minus,) = (dot.phi(i, j) for dot in self.pair)
-        return (plus - minus,)
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        (plus,), (minus,) = (dot.rows(i, j) for dot in self.pair)
-        return (Row(ZERO, plus.pi - minus.pi, ZERO, plus.pj - minus.pj),)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        (plus,), (minus,) = (dot.gamma(i, j, vi, vj) for dot in self.pair)
         return (plus - minus,)
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import Scalar, Vec3, cross
-from .base import Pose, Primitive, Row, Twist
+from ..algebra import Scalar, Vec3
+from .base import Pose, Primitive
 
 
 @dataclass(frozen=True)
@@ -40,17 +40,3 @@ class Distance(Primitive):
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         dd, L, L0 = self.change(i, j), self.length, self.design_length
         return ((dd @ (2.0 * self.d0 + dd) + (L0 - L) * (L0 + L)) * (0.5 / L),)
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        u = (1.0 / self.length) * (self.d0 + self.change(i, j))
-        return (Row(-u, cross(u, i.turn(self.s_i)), u, cross(j.turn(self.s_j), u)),)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        d, S_i, S_j = self.d0 + self.change(i, j), i.turn(self.s_i), j.turn(self.s_j)
-        d_dot = vj.of(S_j) - vi.of(S_i)
-        return (
-            -(
-                (d_dot @ d_dot + d @ (vj.centripetal(S_j) - vi.centripetal(S_i)))
-                * (1.0 / self.length)
-            ),
-        )

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import ZERO, Scalar, Vec3, cross
-from .base import Pose, Primitive, Row, Twist
+from ..algebra import Scalar, Vec3
+from .base import Pose, Primitive
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,3 @@ class Dot10(Primitive):
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         da, db = i.swing(self.a), j.swing(self.b)
         return (da @ (self.b + db) + self.a @ db,)
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        n = cross(i.turn(self.a), j.turn(self.b))
-        return (Row(ZERO, n, ZERO, -n),)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        a, b = i.turn(self.a), j.turn(self.b)
-        n_dot = cross(cross(vi.w, a), b) + cross(a, cross(vj.w, b))
-        return (n_dot @ (vj.w - vi.w),)

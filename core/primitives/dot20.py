@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..algebra import Scalar, Vec3, cross
-from .base import Drive, Pose, Primitive, Row, Twist
+from ..algebra import Scalar, Vec3
+from .base import Drive, Pose, Primitive
 
 
 @dataclass(frozen=True)
@@ -42,21 +42,3 @@ class Dot20(Primitive):
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         dd = self.change(i, j)
         return (i.swing(self.a) @ (self.d0 + dd) + self.a @ dd - self.drive.c,)
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        a, d = i.turn(self.a), self.d0 + self.change(i, j)
-        return (Row(-a, cross(a, d + i.turn(self.s_i)), a, cross(j.turn(self.s_j), a)),)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        a, d, S_i, S_j = (
-            i.turn(self.a),
-            self.d0 + self.change(i, j),
-            i.turn(self.s_i),
-            j.turn(self.s_j),
-        )
-        a_dot, d_dot = cross(vi.w, a), vj.of(S_j) - vi.of(S_i)
-        turning = cross(vi.w, a_dot) @ d + 2.0 * (a_dot @ d_dot)
-        return (self.drive.c_tt - (turning + a @ (vj.centripetal(S_j) - vi.centripetal(S_i))),)
-
-    def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return (self.drive.c_t,)

@@ -20,8 +20,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import ZERO, Scalar, Vec3, cross
-from .base import Pose, Primitive, Row, Twist
+from ..algebra import Scalar, Vec3
+from .base import Pose, Primitive
 
 
 @dataclass(frozen=True)
@@ -38,12 +38,3 @@ class Dot21(Primitive):
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         du = j.u - i.u
         return tuple(i.swing(a) @ (self.e0 + du) + a @ du for a in (self.f, self.g))
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        e, axes = self.e0 + (j.u - i.u), (i.turn(self.f), i.turn(self.g))
-        return tuple(Row(-a, cross(a, e), a, ZERO) for a in axes)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        e, e_t = self.e0 + (j.u - i.u), vj.v - vi.v
-        turning = (cross(vi.w, i.turn(a)) for a in (self.f, self.g))
-        return tuple(-(cross(vi.w, a_t) @ e + 2.0 * (a_t @ e_t)) for a_t in turning)

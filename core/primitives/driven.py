@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..algebra import ZERO, Scalar, Vec3, cross
+from ..algebra import ZERO, Scalar, Vec3
 from .base import Drive, Pose, Primitive, Row, Twist
 
 
@@ -42,15 +42,6 @@ class DrivenCoordinate(Primitive):
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.k @ (j.u + j.swing(self.s)) - self.drive.c,)
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        return (Row(ZERO, ZERO, self.k, cross(j.turn(self.s), self.k)),)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        return (self.drive.c_tt - self.k @ vj.centripetal(j.turn(self.s)),)
-
-    def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return (self.drive.c_t,)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, X, Y, Z
-from .base import Pose, Primitive, Row, Twist
+from .base import Pose, Primitive, Row
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,3 @@ class Ground(Primitive):
         translation = (Row(ZERO, ZERO, e, ZERO) for e in (X, Y, Z))
         rotation = (Row(ZERO, ZERO, ZERO, e) for e in (X, Y, Z))
         return *translation, *rotation
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        return (0.0,) * 6

@@ -25,8 +25,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..algebra import Quat, Scalar, Vec3, X, Y, Z, cross, vec
-from .base import Drive, Pose, Row, Twist
+from ..algebra import Quat, Scalar, Vec3, cross, vec
+from .base import Drive, Pose, Twist
 from .dot12 import Dot12
 from .spherical import Spherical
 
@@ -59,22 +59,3 @@ class NamedSlide(Spherical):
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return tuple(vec(super().phi(i, j)) - self.drive.c * i.turn(self.h))
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        slid = self.drive.c * i.turn(self.h)
-        return tuple(
-            row._replace(pi=row.pi - cross(slid, e))
-            for row, e in zip(super().rows(i, j), (X, Y, Z), strict=True)
-        )
-
-    def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return tuple(self.drive.c_t * i.turn(self.h))
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        h = i.turn(self.h)
-        slid = (
-            vi.centripetal(self.drive.c * h)
-            + 2.0 * (self.drive.c_t * cross(vi.w, h))
-            + self.drive.c_tt * h
-        )
-        return tuple(a + b for a, b in zip(super().gamma(i, j, vi, vj), slid, strict=True))

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross
-from .base import Pose, Primitive, Row, Twist
+from ..algebra import ZERO, Scalar, Vec3
+from .base import Pose, Primitive
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,3 @@ class Spherical(Primitive):
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return tuple(self.d0 + ((j.u - i.u) + (j.swing(self.s_j) - i.swing(self.s_i))))
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        S_i, S_j = i.turn(self.s_i), j.turn(self.s_j)
-        # e . (dpi x S) = dpi . (S x e)
-        return tuple(Row(-e, -cross(S_i, e), e, cross(S_j, e)) for e in (X, Y, Z))
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        return tuple(vi.centripetal(i.turn(self.s_i)) - vj.centripetal(j.turn(self.s_j)))

@@ -2,6 +2,7 @@
 
 1. `tape`: run an equation on traced scalars (`Traced`). A `Tape` records each operation once and
    folds literal zeros, ones and signs. `jacobian` traces the derivatives by the chain rule.
+   `moving` has derivatives of one equation while it is evaluated, over any scalars.
 2. `elimination`: trace the solution of a linear system. Literal and lone pivots come first, then
    dense cores with partial pivoting by compare-and-select.
 3. `straight_line`: collect the operations of some outputs into a `Program`. `Prepared` moves terms

@@ -44,6 +44,13 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "max": _max,
 }
 
+# The iteration of neighbours goes on while each takes as many more of them again: the others are
+# iterated with the next group, which is nearer.
+WORTH = 2.0
+# A group is at most so many times as long as what was accepted of the one before: lanes farther
+# away would take more iterations for nothing.
+GROWS = 1.5
+
 Call = tuple[Callable[..., Any], tuple[Any, ...]]
 
 
@@ -100,9 +107,14 @@ class NumpyExecutor:
         """Attempt all lanes, each alone."""
         self.settle("predict", self.plan.alone)
 
-    def settle(self, start: str, tests: Sequence[str]) -> None:
-        """Attempt all lanes: predict by `start`, iterate Newton, run the tests."""
-        slots = self.plan.slots
+    def settle(self, start: str, tests: Sequence[str], neighbours: int = 0) -> None:
+        """Attempt all lanes: predict by `start`, iterate Newton, run the tests.
+
+        Args:
+            neighbours: number of lanes that are wanted, none after one that is not accepted: the
+                iteration ends when it takes few more of them.
+        """
+        slots, ready = self.plan.slots, 0
         residual, iterations = (self.block[slots[name]] for name in ("residual", ITERATIONS))
         done = np.zeros(self.lanes, dtype=np.bool_)
         iterations[:] = 0.0
@@ -111,7 +123,8 @@ class NumpyExecutor:
             self.run("newton")
             iterations += ~done
             done |= residual < self.plan.tolerance
-            if (done | ~np.isfinite(residual)).all():
+            before, ready = ready, leading(done[:neighbours])
+            if 0 < ready < WORTH * before or (done | ~np.isfinite(residual)).all():
                 break
         for name in self.plan.after:
             self.run(name)
@@ -283,10 +296,28 @@ class NumpyExecutor:
         return call
 
 
-def leading(margins: Array) -> int:
+def leading(margins: Array | NDArray[np.bool_]) -> int:
     """Return the number of accepted lanes before the first rejected one."""
     good = margins > 0.0
     return len(good) if good.all() else int(good.argmin())
+
+
+def _spread(lanes: int) -> NDArray[np.intp]:
+    """Return the lanes of the `NODES` among as many lanes or more."""
+    return np.array([place_of(k, lanes)[1] for k in range(NODES)])
+
+
+def lagrange(times: Array, nodes: Array) -> Array:
+    """Lagrange's weights for the times, shape (n,), of nodes for each; nodes and weights have shape
+    (nodes, n).
+    """
+    found, ahead = np.empty_like(nodes), times - nodes
+    with np.errstate(all="ignore"):
+        for k, node in enumerate(nodes):  # one after the other: there may be millions of samples
+            factors = ahead / (node - nodes)
+            factors[k] = 1.0
+            found[k] = factors.prod(axis=0)
+    return found
 
 
 class NumpyTrack:
@@ -341,15 +372,16 @@ class NumpyTrack:
             np.array(each).T
             for each in (plan.carried, plan.moves if extrapolates else plan.carried)
         )
-        sampled, smooth, whole = list(plan.sampled), False, False
+        sampled, smooth, wanted = list(plan.sampled), False, lanes
+        nodes, times = _spread(lanes), samples[0, :0]
         block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]
         while at < stop:
-            # extrapolation needs groups that begin at a multiple of the lanes: a shorter group
-            # goes up to there
-            count = min(lanes - at % lanes if whole and extrapolates else lanes, stop - at)
+            count = min(wanted, stop - at)
             block[sampled, :count] = samples[:, at : at + count]
-            block[sampled, count:] = samples[:, stop - 1 : stop]
-            executor.settle("extrapolate" if smooth else "predict", plan.joined)
+            block[sampled, count:] = samples[:, at + count - 1, None]
+            if smooth:
+                block[sampled[-NODES:]] = lagrange(block[sampled[0]], times)
+            executor.settle("extrapolate" if smooth else "predict", plan.joined, count)
             accepted = leading(block[plan.slots[MARGIN], :count])
             if accepted:
                 self._keep(self._sides[side], at, block[:, :accepted])
@@ -357,13 +389,16 @@ class NumpyTrack:
                 executor.go_back(samples[:, at - 1 : at])
             else:
                 break
-            whole = accepted == lanes
-            smooth = extrapolates and whole and at % lanes == 0 and at + accepted < stop
+            smooth = extrapolates and accepted >= NODES and at + accepted < stop
             for name in () if smooth or not accepted else plan.remaining:
                 executor.run(name)
+            if smooth:  # the nodes are all over the lanes accepted, however many
+                chosen = _spread(accepted)
+                block[:, nodes] = block[:, chosen]
+                times = np.repeat(samples[0, at + chosen, None], lanes, axis=1)
             source, target = moved if smooth else carried
-            block[target] = block[source, max(accepted - 1, 0), None]
-            at += accepted
+            block[target] = block[source, nodes[-1] if smooth else max(accepted - 1, 0), None]
+            at, wanted = at + accepted, min(lanes, 1 + int(GROWS * accepted))
         self.anchors[side] = block[carried[1], 0]
         return at
 

@@ -65,6 +65,10 @@ class Tape:
             self.scalars.append(scalar)
         return scalar
 
+    def known(self, *node: str | float) -> Traced | None:
+        """Return the scalar of an operation if it is recorded."""
+        return self._known.get(node)  # type: ignore[call-overload]
+
     def input(self, slot: int) -> Traced:
         """Return the value of a slot at run time."""
         return self.node("input", slot)
@@ -95,26 +99,26 @@ class Traced:
         self.opposite = opposite
 
     def __add__(self, b: Scalar) -> Scalar:
-        return _add(self, b)
+        return _add(self, b) if isinstance(b, NUMBERS) else NotImplemented
 
     def __radd__(self, a: Scalar) -> Scalar:
         return _add(a, self)
 
     def __sub__(self, b: Scalar) -> Scalar:
-        return _sub(self, b)
+        return _sub(self, b) if isinstance(b, NUMBERS) else NotImplemented
 
     def __rsub__(self, a: Scalar) -> Scalar:
         return _sub(a, self)
 
     def __mul__(self, b: Scalar) -> Scalar:
         # Vec3.__rmul__ computes the product with a vector
-        return _scale("*", self, b) if isinstance(b, Traced | float | int) else NotImplemented
+        return _scale("*", self, b) if isinstance(b, NUMBERS) else NotImplemented
 
     def __rmul__(self, a: Scalar) -> Scalar:
         return _scale("*", a, self)
 
     def __truediv__(self, b: Scalar) -> Scalar:
-        return _scale("/", self, b)
+        return _scale("/", self, b) if isinstance(b, NUMBERS) else NotImplemented
 
     def __rtruediv__(self, a: Scalar) -> Scalar:
         return _scale("/", a, self)
@@ -143,6 +147,10 @@ class Traced:
         return where_larger(a, b, p, q)
 
 
+NUMBERS = (Traced, float, int)
+"""Kinds of scalars for operations with a traced scalar; others do them themselves."""
+
+
 def _unknown(a: Scalar) -> bool:
     """Return whether it is NaN, known before any computation."""
     return not isinstance(a, Traced) and a != a
@@ -166,6 +174,8 @@ def _operation(op: str, a: Scalar, b: Scalar) -> Scalar:
     i, j = tape.number(a), tape.number(b)
     if op in "+*" and i > j:
         i, j = j, i
+    if op == "-" and (turned := tape.known(op, j, i)) is not None:
+        return -turned
     return tape.node(op, i, j)
 
 
@@ -219,6 +229,8 @@ def _lanes(*scalars: Scalar) -> bool:
 
 
 def _unary(op: str, a: Scalar, value: Callable[[float], float]) -> Scalar:
+    if hasattr(a, "of"):
+        return a.of(op, a)
     return a.tape.node(op, a.number) if isinstance(a, Traced) else value(a)
 
 
@@ -242,6 +254,8 @@ def _extreme(
 ) -> Scalar:
     if isinstance(a, Traced) or isinstance(b, Traced):
         return a if _same(a, b) else _operation(op, a, b)
+    if (moving := next((x for x in (a, b) if hasattr(x, "of")), None)) is not None:
+        return moving.of(op, a, b)
     if _lanes(a, b):
         return cast("Array", of_lanes(a, b))
     return value(a, b) if b == b else b  # Python's min and max keep a if b is NaN
@@ -300,7 +314,7 @@ Gradient: TypeAlias = dict[int, Scalar]
 """Derivatives by position of the input; zero derivatives are left out."""
 
 
-def _weights(smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ...]:
+def weights(smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ...]:
     """Return the derivatives of an operation by its operands a and b; y is its value."""
     match op:
         case "+":
@@ -329,10 +343,15 @@ def _weights(smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tu
             first = where_larger(a - b + 1.0, a - b - 1.0, 0.5 + 0.5 * sign, 0.5 - 0.5 * sign)
             return first, 1.0 - first
         case _:
-            raise TypeError(
-                f"operation {op!r} has a kink and no derivative; leave it out of equations to be"
-                " differentiated"
-            )
+            raise no_derivative(op)
+
+
+def no_derivative(op: str) -> TypeError:
+    """Return the refusal of an operation."""
+    return TypeError(
+        f"operation {op!r} has a kink and no derivative; leave it out of equations to be"
+        " differentiated"
+    )
 
 
 def jacobian(
@@ -375,10 +394,8 @@ def changes(
             p, q = (gradients.get(k, {}) for k in read[1:])
             gradients[number] = _chosen(a, b, p, q)
         elif not (smooth and op == "larger"):  # which "where" reads itself
-            weights = _weights(smooth, op, tape.scalars[number], *(tape.scalars[k] for k in read))
-            gradients[number] = _sum(
-                zip(weights, (gradients.get(k, {}) for k in read), strict=True)
-            )
+            found = weights(smooth, op, tape.scalars[number], *(tape.scalars[k] for k in read))
+            gradients[number] = _sum(zip(found, (gradients.get(k, {}) for k in read), strict=True))
     return [
         gradients.get(value.number, {}) if isinstance(value, Traced) else {} for value in values
     ]

@@ -15,7 +15,7 @@ from rich.text import Text
 from ..case.case import PER_TRAVEL
 from ..case.io.escape import visible
 from ..errors import shortened
-from ..harness.labels import DRIVER_UNITS, displayed, driver_unit
+from ..harness.labels import DRIVER_UNITS, displayed, driver_unit, is_table
 from ..harness.record import Facts, Outcome, Record, Results
 from ..unit_text import value_text, with_unit
 from . import terminal
@@ -183,7 +183,7 @@ def print_travel(results: Results, console: Console) -> None:
             for record in results.records
             if record.case == case and record.outcome in SOLVED and record.driver
         ]
-        if facts.get("units") and solved:
+        if is_table(facts) and solved:
             _print(solved[0], facts, console)
 
 

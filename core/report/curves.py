@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ..case.io.table_file import WRITERS, Kind, Rows, put_csv
-from ..harness.labels import DRIVER_UNITS, in_table_units
+from ..harness.labels import DRIVER_UNITS, in_table_units, is_table
 from ..harness.record import Facts, OutputSeries, Record, Results
 
 COLUMNS: Mapping[str, Kind] = {
@@ -76,7 +76,7 @@ def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
     are several. Rates of change per metre of travel stay per metre.
     """
     facts: Facts = results.run.get("cases", {})
-    if not facts or not all(each.get("units") for each in facts.values()):
+    if not facts or not all(map(is_table, facts.values())):
         return None
     tables = list[tuple[str, str, dict[str, list[float | None]]]]()
     known = set[str]()

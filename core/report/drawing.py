@@ -60,8 +60,9 @@ class Drawing(msgspec.Struct):
         wheels: body, centre [m] and axis of rotation in its frame, global upward direction, radius
             [m], nodes of the steering axis and a point of the vehicle's centre plane; empty if
             there are none.
-        arrows: body, place in its frame [m], label, and global force [N] in each frame of the
-            scene; null if unknown.
+        arrows: body, place in its frame [m], label, and global force in each frame of the scene;
+            null if unknown.
+        unit: of the arrows: N, or that of lengths, if they are moves of points.
         paths: nodes whose path over the frames is drawn.
         steps: the caption of each frame.
         start: the frame closest to the design position, which is shown first.
@@ -79,6 +80,7 @@ class Drawing(msgspec.Struct):
     tubes: list[Nodes] = []
     wheels: list[Wheel] = []
     arrows: list[tuple[int, Numbers, str, list[Numbers | None]]] = []
+    unit: str = "N"
     paths: list[int] = []
     steps: list[str] = []
     start: int = 0

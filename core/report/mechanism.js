@@ -135,7 +135,7 @@ function mechanism(box, drawing, name, trouble) {
 
 // The controls of a scene: the player of several samples; views, layers and pictures. Layers named
 // in the box's `data-off` begin hidden; with `data-forces`, arrows may follow.
-function controlsOf(box, { steps, wheels, arrows }) {
+function controlsOf(box, { steps, wheels, arrows, unit }) {
   const make = (kind, given, ...content) => {
     const made = document.createElement(kind);
     for (const [key, value] of Object.entries(given)) made.setAttribute(key, value);
@@ -163,7 +163,8 @@ function controlsOf(box, { steps, wheels, arrows }) {
   const checks = layers.map((name) => {
     const check = make("input", { type: "checkbox", "data-layer": name });
     check.checked = !off.includes(name);
-    return make("label", {}, check, ` ${name}`);
+    const word = name === "forces" && unit !== "N" ? "moves" : name;
+    return make("label", {}, check, ` ${word}`);
   });
   const pictures = ["SVG", "PNG", ...(steps.length > 1 ? ["film"] : [])].map((kind) =>
     button(kind, { "data-picture": kind.toLowerCase() }),
@@ -205,13 +206,13 @@ function player(box, current, show, last, closed) {
   return { toggle, pause };
 }
 
-// The scale of the arrows as text, for a round force.
-function explainArrows(box, { perMetre, places }) {
+// The scale of the arrows as text, for a round length.
+function explainArrows(box, { perMetre, places, unit }) {
   const place = box.querySelector("[data-scale]");
   if (place) place.textContent = "";
   if (!perMetre) return;
   const length = niceStep(span(places.flat()) / 20);
-  const [millimetres, newtons] = [shown(1000 * length), shown(perMetre * length)];
-  const scale = `${millimetres} mm of arrow are ${newtons} N.`;
+  const [millimetres, size] = [shown(1000 * length), shown(perMetre * length)];
+  const scale = `${millimetres} mm of arrow are ${size} ${unit}.`;
   place.textContent = scale;
 }

@@ -28,11 +28,13 @@ function motionOf(drawing) {
       const vector = vectors[frame];
       if (!vector || !perMetre) return [];
       const from = placed(b, place, frame);
-      return [{ name, from, to: sum(from, vector, 1 / perMetre), size: Math.hypot(...vector) }];
+      const size = `${shown(Math.hypot(...vector), ".3g")} ${drawing.unit}`;
+      return [{ name, from, to: sum(from, vector, 1 / perMetre), size }];
     }),
   );
   const moving = bodies.flatMap((body, b) => (body.fixed ? [] : [b]));
-  return { frames, moving, placed, rotated, places, wheels, forces, perMetre };
+  const { unit } = drawing;
+  return { frames, moving, placed, rotated, places, wheels, forces, perMetre, unit };
 }
 
 // Newtons per metre of an arrow; 0 without forces. The arrow of the largest force is about a

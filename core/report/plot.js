@@ -8,7 +8,8 @@ let clips = 0;
 // Draw a figure into a box, and draw it again when the size of the box changes.
 //   data: the traces, with their values in place of "driver".
 // Returns `reset` (the zoom), `show` (a series, or hide it), `fit` (the figure to a width and
-// height for paper, or to the box without them) and `change` (to other traces and lines across).
+// height for paper, or to the box without them), `change` (to other traces and lines across) and
+// `at` (the values at a place of the box).
 function plot(box, { data, layout }) {
   const clip = `clip-${clips++}`;
   const hidden = new Set();
@@ -112,6 +113,7 @@ function plot(box, { data, layout }) {
       else hidden.add(series);
       draw();
     },
+    at: ([x, y]) => ({ x: frame.x.back(x), y: frame.y.back(y) }),
     change(traces, across) {
       data = traces;
       layout.shapes = across;

@@ -238,7 +238,7 @@ function paintForce({ line, seen, colour }, { from, to }) {
 }
 
 function writeForce({ seen, colour, write }, { name, to, size }) {
-  write(seen(to), `${name} ${shown(size, ".3g")} N`, colour("force"), BESIDE);
+  write(seen(to), `${name} ${size}`, colour("force"), BESIDE);
 }
 
 // The axes of a body's frame; their names where few bodies move.

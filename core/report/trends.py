@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..harness.labels import motion_unit, product
+from ..harness.labels import displayed, motion_unit, product
 from ..history.queries import Entry, History, unit_of
 from ..history.steps import steps
 from ..history.store import RunRow
@@ -57,13 +57,17 @@ def run_name(row: RunRow) -> str:
     return f"{row.started[:16].replace('T', ' ')} #{row.id}"
 
 
-def largest_errors(entry: Entry, row: RunRow) -> dict[str, float]:
-    """Return the largest errors of the outputs by unit: of values, velocities and accelerations."""
+def largest_errors(entry: Entry, row: RunRow, newest: RunRow) -> dict[str, float]:
+    """Return the largest errors of the outputs by unit, that of the case's file in the newest run:
+    of values, velocities and accelerations.
+    """
     found: dict[str, float] = {}
+    facts = newest.circumstances.get("cases", {}).get(entry.case, {})
     for name, deviations in entry.errors.items():
         for quantity, deviation in deviations.items():
-            unit = motion_unit(unit_of(row, entry.case, name), quantity) or "1"
-            found[unit] = max(found.get(unit, 0.0), deviation.max_abs)
+            si = motion_unit(unit_of(row, entry.case, name), quantity)
+            unit, factor = displayed(si, facts) if si else ("1", 1.0)
+            found[unit] = max(found.get(unit, 0.0), factor * deviation.max_abs)
     return found
 
 

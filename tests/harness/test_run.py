@@ -9,6 +9,7 @@ from kincheck.core.case.case import Series, Truth
 from kincheck.core.errors import CaseError, SolveError
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import NULL_REASONS, run
+from kincheck.core.report.curves import wide
 
 from ..support.fakes import (
     SAMPLES,
@@ -97,6 +98,16 @@ def test_single_deviating_sample_is_located():
     record = record_of(Fake(answer=off("position", lambda p: p + at(6, 1, 1e-6)(0 * p))))
     assert "y: position is off by 1e-06 m at sample 6 (angle = 0.5)" in record.message
     assert record.errors["y"].position.worst_step == 6
+
+
+def test_case_in_millimetres_is_told_in_them():
+    """Its curves stay long: a wide table of them is one of hardpoints."""
+    case = replace(crank("case"), length_unit="mm", angle_unit="deg")
+    off_by = Fake(answer=off("position", lambda p: p + at(6, 1, 1e-6)(0 * p)))
+    results = run([case], [off_by], tol=TOL)
+    assert "y: position is off by 0.001 mm at sample 6 (angle = 28.6" in results.records[0].message
+    assert results.run["cases"]["case"]["units"] == {"length": "mm", "angle": "deg"}
+    assert wide(results) is None
 
 
 @pytest.mark.parametrize("count", [0, 1], ids=["cold solve", "warm solve"])

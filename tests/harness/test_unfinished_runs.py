@@ -3,6 +3,7 @@ well.
 """
 
 import os
+import re
 import shutil
 import tempfile
 from contextlib import contextmanager
@@ -240,6 +241,19 @@ def test_step_has_unit_of_output(path, capsys):
     keep(path, changed(records(), **grown), cases=facts)
     assert history(path, "--case", "first") == 0
     assert " → 1e-10 °/s² since run 3" in capsys.readouterr().out
+
+
+def test_trend_is_in_units_of_file(path, capsys):
+    units = {"length": "mm", "angle": "deg"}
+    facts = {"first": {"outputs": {"x": {"unit": "m"}, "y": {"unit": "rad"}}, "units": units}}
+    nights(path, 1)
+    shifted = {"errors": lambda errors: errors | {"x": _grown(errors["x"])}}
+    keep(path, changed(records(), **shifted), cases=facts)
+    assert history(path, "--case", "first") == 0
+    said = capsys.readouterr().out
+    assert re.search(r"outcome +mm +mm/s +mm/s² +° +°/s +°/s² +us/step", said)
+    assert re.search(r"#1 .*pass +5e-10 ", said)  # of before
+    assert re.search(r"#2 .*pass +5e-10 +0 +1e-7 ", said)
 
 
 def _grown(deviations):

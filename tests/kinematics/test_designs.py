@@ -93,6 +93,13 @@ def test_designs_refuse_bad_geometry(geometry, message):
         solve_designs(strut()[0], "stroke", [0.0], geometry)
 
 
+@pytest.mark.parametrize(("varied", "shape"), [((), (0, 1)), (("joints.ball.point",), (3, 0))])
+def test_designs_refuse_nothing_to_solve(varied, shape):
+    route = lanes_of(PATHS["one side"], strut()[0], varied)
+    with pytest.raises(SolveError, match="vary one place at least"):
+        solve_variants(route, np.zeros(shape), TOL)
+
+
 def test_designs_refuse_bad_order():
     with pytest.raises(SolveError, match=r"^solve_designs: order is 5, expected 0, 1 or 2"):
         solve_designs(strut()[0], "stroke", [0.0], {"joints.ball.point": np.zeros((4, 3))}, order=5)

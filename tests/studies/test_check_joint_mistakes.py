@@ -259,7 +259,7 @@ MISTAKES = {
         ),
     ),
     "called symmetric": ("exchange", lambda: mistaken(InPlane, symmetric=True)),
-    "not smooth": ("newton", lambda: mistaken(InPlane, p.Dot20, phi=rough)),
+    "not smooth": ("newton", lambda: mistaken(Revolute, p.Dot11, phi=rough)),
     "cancellation": ("round-off", lambda: mistaken(Spherical, p.Spherical, phi=cancelling)),
     "math.sqrt": ("equations", lambda: composed(Spherical, lambda arms, *axes: (Root(*arms),))),
     "other coordinates": (

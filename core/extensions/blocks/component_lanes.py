@@ -144,9 +144,11 @@ class ComponentLanes(Lanes):
         self.worst = aligned(len(WORST) * room).reshape(-1, room)
         self._best = self.kinds[0].model.plan.best
         self._fixed, self._ahead = ([kind.fixed.copy() for kind in self.kinds] for _ in range(2))
-        self._samples = [
-            aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in self.kinds
-        ]
+        tables = {  # types without drivers share one
+            kind.drivers: aligned(len(kind.model.sampled) * room).reshape(-1, room)
+            for kind in self.kinds
+        }
+        self._given, self._samples = tables, [tables[kind.drivers] for kind in self.kinds]
         self._carried = [_carried_columns(kind.model.plan) for kind in self.kinds]
         # from what is fixed now, and from what is ahead
         self._calls: list[list[Callable[[int], object]]] = [[], []]
@@ -255,13 +257,15 @@ class ComponentLanes(Lanes):
                 own = f"{'b' if labels is BODY else 'p'}{which.index(name)}"
                 columns.extend(range(place.start, place.stop))
                 rows.extend(kind.rows(f"{label} {own}", member))
-        return np.array(columns, np.intp), np.array(rows, np.intp), still
+        order = np.argsort(columns)
+        return np.array(columns, np.intp)[order], np.array(rows, np.intp)[order], still
 
     def accept_by(self, limits: Mapping[str, float]) -> None:
         """See `Lanes`."""
         self._tol = limits["tolerance"]
         for kind, fixed in zip(self.kinds, self._fixed, strict=True):
-            fixed[:, [kind.column[name] for name in limits]] = [*limits.values()]
+            for name, value in limits.items():
+                fixed[:, kind.column[name]] = value
 
     def set_prediction_start(self, time: float, path: Path) -> PoseFailure | None:
         """See `Lanes`. The rates of the path where the mechanism stands are those of a sample."""
@@ -281,18 +285,17 @@ class ComponentLanes(Lanes):
             fixed[:] = kept
 
     def sample_tables(self, times: Array, path: Path) -> list[Array]:
-        """See `Lanes`: by component type; types without drivers share one table."""
-        alone = times[None]
+        """See `Lanes`: one for the types with the same drivers."""
         return [
-            samples(self.mechanism, kind.drivers, self.unit, path, times) if kind.drivers else alone
-            for kind in self.kinds
+            samples(self.mechanism, drivers, self.unit, path, times) if drivers else times[None]
+            for drivers in self._given
         ]
 
     def attempt_at(self, tables: Sequence[Array], *, neighbours: bool = False) -> Array:
         """See `Lanes`."""
         count = tables[0].shape[1]
         self.last, self._times = count - 1, tables[0][0]
-        for table, room in zip(tables, self._samples, strict=True):
+        for table, room in zip(tables, self._given.values(), strict=True):
             room[:, :count] = table
             room[:, count:] = table[:, count - 1 :]
         self.worst[:] = self._best
@@ -303,8 +306,11 @@ class ComponentLanes(Lanes):
 
     def motions(self, count: int) -> Array:
         """See `Lanes`."""
+        moving = self.world[self._rows, :count]
+        if len(moving) == len(self._still):
+            return moving
         found = np.repeat(self._still, count, axis=1)
-        found[self._columns] = self.world[self._rows, :count]
+        found[self._columns] = moving
         return found
 
     def uncertain(self, count: int, path: Path) -> Mapping[int, float]:

@@ -6,11 +6,11 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 
-from ...case.case import Case
+from ...case.case import TIME, Case
 from .dialects import C, steps_text, tables, words_of
 from .solved import SolvedCase, solved_case
 
-WHOLE = ("CARRY", "STANDING")
+WHOLE = ("CARRY", "STANDING", "DRIVER_SLOT")
 """Beginnings of the tables of whole numbers."""
 HEADER = """\
 /* {case}: {source}
@@ -31,9 +31,9 @@ void {n}_start(void *state);           /* the design position */
 /* Move to a value of the driver, {driver} [{unit}], which has a rate there, and write
  * 3 * {n}_outputs() numbers. Returns 0; or 1: the iteration does not converge; 2: a lock-up or
  * another branch is in between. The state and the outputs then stay as they are. The way there is
- * followed in steps that are as small as it takes. */
+ * followed in steps that are as small as it takes.{others} */
 int {n}_move(void *state, double driver, double rate, double *outputs);
-
+{steer}
 int {n}_parameters(void);              /* number of parameters */
 const char *{n}_parameter(int which);  /* name and unit of a parameter */
 double {n}_nominal(int which);         /* its value at the start */
@@ -46,6 +46,38 @@ void {n}_set(void *state, int which, double value);
 }}
 #endif
 #endif
+"""
+
+STEER_HEADER = """
+int {n}_drivers(void);                 /* number of drivers */
+const char *{n}_driver(int which);     /* name and unit of a driver */
+
+/* Move all drivers to values of their own, by a straight way from their present ones, and write
+ * the outputs at these rates of the drivers. Returns what {n}_move does, which begins at the
+ * design position again. */
+int {n}_move_all(void *state, const double *drivers, const double *rates, double *outputs);
+"""
+
+STEER_TAIL = """
+int {n}_drivers(void) {{ return DRIVERS; }}
+
+const char *{n}_driver(int which) {{
+  static const char *const names[] = {{{drivers}}};
+  return which >= 0 && which < DRIVERS ? names[which] : "";
+}}
+
+int {n}_move_all(void *state, const double *drivers, const double *rates, double *outputs) {{
+  double *s = state, w[SIZE], n[SIZE];
+  int k, failed;
+  for (k = 0; k < DRIVERS; k++) if (!isfinite(drivers[k]) || !isfinite(rates[k])) return 1;
+  if (!(s[SIZE + PARAMETERS] > 0.0)) return 1;
+  copy(w, s);
+  failed = steer(w, n, drivers);
+  if (failed) return failed;
+  copy(s, w);
+  tell_at(s, outputs, rates);
+  return 0;
+}}
 """
 
 TAIL = """
@@ -72,7 +104,7 @@ int {n}_move(void *state, double driver, double rate, double *outputs) {{
   int failed;
   if (!isfinite(goal) || !isfinite(r) || !(s[SIZE + PARAMETERS] > 0.0)) return 1;
   copy(w, s);
-  failed = travel(w, n, goal, HALVINGS);
+{again}  failed = travel(w, n, goal, HALVINGS);
   if (failed) return failed;
   copy(s, w);
   tell(s, outputs, r);
@@ -100,19 +132,15 @@ double {n}_nominal(int which) {{ return which >= 0 && which < PARAMETERS ? NOMIN
 
 void {n}_set(void *state, int which, double value) {{
   double *s = state, *values = s + SIZE;
-  int k;
   if (which < 0 || which >= PARAMETERS) return;
   values[which] = value;
-  copy(s, START);
-  for (k = 0; k < PARAMETERS; k++) move_geometry(s, k, values[k] - NOMINAL[k]);
-  values[PARAMETERS] = assemble(s);
-  begin(s);
+  values[PARAMETERS] = place(s, values);
 }}
 """
 
 
 def files(case: Case, places: Sequence[str], *, forces: bool = False) -> Mapping[str, bytes]:
-    """Return the bytess of NAME.c and NAME.h, by the names of the files.
+    """Return the bytes of NAME.c and NAME.h, by the names of the files.
 
     Raises:
         KincheckError: the case has a part that the code cannot have.
@@ -133,15 +161,18 @@ def identifier(name: str) -> str:
 
 def header(solved: SolvedCase, name: str) -> str:
     """Return the header."""
-    case = solved.case
+    case, sweep = solved.case, solved.case.sweep
+    others = " The other drivers follow their motions,\n * or hold their values at design."
     source = re.sub(r"\*/|\s+", " ", case.source)
     return HEADER.format(
         n=name,
         case=case.name,
         source=source,
         guard=f"{name.upper()}_H",
-        driver=case.sweep.driver,
-        unit=solved.driver_unit,
+        driver=sweep.driver,
+        unit=solved.unit(sweep.driver),
+        others=others if solved.is_steered and sweep.driver != TIME else "",
+        steer=STEER_HEADER.format(n=name) if solved.is_steered else "",
     )
 
 
@@ -159,9 +190,11 @@ def source(solved: SolvedCase, name: str) -> str:
         )
         for table, values in known.items()
     ]
-    outputs, parameters = (", ".join(map(json.dumps, each)) for each in words_of(solved))
+    words = {what: ", ".join(map(json.dumps, each)) for what, each in words_of(solved).items()}
     reset = "  for (int k = 0; k < PARAMETERS; k++) s[SIZE + k] = NOMINAL[k];\n"
+    again = "place(w, s + SIZE)" if solved.parameters else "{ copy(w, START); begin(w); }"
     tail = TAIL + (WITH_PARAMETERS if solved.parameters else WITHOUT_PARAMETERS)
+    tail += STEER_TAIL if solved.is_steered else ""
     return "\n".join(
         [
             f"/* {solved.case.name}, written by kincheck: see {name}.h */",
@@ -174,9 +207,9 @@ def source(solved: SolvedCase, name: str) -> str:
             C.text(steps_text(solved)),
             tail.format(
                 n=name,
-                outputs=outputs,
-                parameters=parameters,
+                **words,
                 reset=reset if solved.parameters else "",
+                again=f"  if (w[STEERED] > 0.0) {again};\n" if solved.is_steered else "",
             ),
         ]
     )

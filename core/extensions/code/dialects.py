@@ -106,7 +106,10 @@ ANSWER settle(LANE s) {
   for (COUNT k = 0; k < MOST; k++) {
     newton(s);
     if (!(s[RESIDUAL] < INFINITY)) return 0;
-    if (s[RESIDUAL] < TOLERANCE) return 1;
+    if (s[RESIDUAL] < TOLERANCE) {
+      newton(s); /* near a singular pose its last digits count */
+      return s[RESIDUAL] < TOLERANCE ? 1 : 0;
+    }
   }
   return 0;
 }
@@ -199,6 +202,43 @@ ANSWER assemble(LANE s) {
   }
   outputs(s);
   return s[CLOSURE] <= CLOSED && s[BRANCH] > 0.0 ? 1 : 0;
+}
+"""
+PLACE = """
+/* lane s at the design position of values of the parameters: 1 if it closes there */
+ANSWER place(LANE s, FROM values) {
+  copy(s, START);
+  for (COUNT k = 0; k < PARAMETERS; k++) move_geometry(s, k, values[k] - NOMINAL[k]);
+  COUNT closes = assemble(s);
+  begin(s);
+  return closes;
+}
+"""
+
+
+STEER = """
+/* lane w by a straight way of the drivers to other values; n is for attempts */
+ANSWER steer(LANE w, LANE n, FROM values) {
+  for (COUNT k = 0; k < DRIVERS; k++) {
+    REAL now = w[DRIVER_SLOT[3 * k]] / DRIVER_UNIT[k];
+    w[STEERED + 1 + 2 * k] = now;
+    w[STEERED + 2 + 2 * k] = values[k] - DRIVER_DESIGN[k] - now;
+  }
+  w[STEERED] = 1.0;
+  w[AT] = 0.0;
+  begin(w);
+  return travel(w, n, 1.0, HALVINGS);
+}
+
+ACTION tell_at(FROM s, LANE out, FROM rates) {
+  SCRATCH(f, SIZE);
+  copy(f, s);
+  for (COUNT k = 0; k < DRIVERS; k++) {
+    f[DRIVER_SLOT[3 * k + 1]] = DRIVER_UNIT[k] * rates[k];
+    f[DRIVER_SLOT[3 * k + 2]] = 0.0;
+  }
+  outputs(f);
+  tell(f, out, 1.0);
 }
 """
 
@@ -297,8 +337,14 @@ def _constant(value: float) -> str:
     return "NOTHING" if math.isnan(value) else "INFINITY" if value > 0.0 else "(-INFINITY)"
 
 
-def _drive(k: int, slots: Sequence[int], motion: Motion, factor: float) -> Iterator[str]:
-    """Yield the lines that set the five numbers of the k-th driver at time t."""
+def _drive(
+    k: int, slots: Sequence[int], motion: Motion, factor: float, steered: int
+) -> Iterator[str]:
+    """Yield the lines that set the five numbers of the k-th driver at time t.
+
+    Args:
+        steered: the number of a lane that tells whether the way is straight; zero for none.
+    """
     shift = 0.0
     if isinstance(motion, Absolute):
         motion, shift = motion.motion, motion.design
@@ -321,6 +367,11 @@ def _drive(k: int, slots: Sequence[int], motion: Motion, factor: float) -> Itera
     else:
         assert isinstance(motion, Ramp)
         x, v, a = f"{motion.rate!r} * t - {shift!r}", repr(motion.rate), "0.0"
+    if steered:
+        begin, change = f"s[{steered + 1 + 2 * k}]", f"s[{steered + 2 + 2 * k}]"
+        x = f"s[STEERED] > 0.0 ? {begin} + {change} * t : {x}"
+        v = f"s[STEERED] > 0.0 ? {change} : {v}"
+        a = f"s[STEERED] > 0.0 ? 0.0 : {a}"
     yield f"x = {x};"
     for slot, value in zip(slots[:3], ("x", v, a), strict=True):
         yield f"s[{slot}] = {factor!r} * ({value});"
@@ -387,7 +438,8 @@ def _function(head: str, body: Iterable[str]) -> str:
 def steps_text(solved: SolvedCase) -> str:
     """Return the functions of a lane: programs, samples, steps and outputs."""
     time = solved.model.slots[TIME]
-    drives = [line for k, each in enumerate(solved.drives()) for line in _drive(k, *each)]
+    steered = solved.steered if solved.is_steered else 0
+    drives = [line for k, each in enumerate(solved.drives()) for line in _drive(k, *each, steered)]
     kept = [line for each in solved.outputs for line in _kept(each)]
     told = [line for k, each in enumerate(solved.outputs) for line in _told(k, each)]
     programs = [text for each in solved.programs.items() for text in _by_choice(*each)]
@@ -432,6 +484,10 @@ def steps_text(solved: SolvedCase) -> str:
             ]
         own.append("outputs(f);")
     parts += [steps, _function("ACTION tell(FROM s, LANE out, NUMBER r)", [*own, *told])]
+    if solved.parameters:
+        parts.append(PLACE.strip())
+    if solved.is_steered:
+        parts.append(STEER.strip().replace("SIZE", str(solved.size)))
     return "\n\n".join(parts)
 
 
@@ -444,6 +500,13 @@ def tables(solved: SolvedCase) -> dict[str, Sequence[float]]:
         if isinstance(plain, Table):
             motions |= {f"KNOTS_{k}": plain.times, f"PIECES_{k}": plain.pieces}
     standing = {"STANDING": solved.standing} if solved.others else {}
+    if solved.is_steered:
+        mechanism = solved.case.mechanism
+        standing |= {
+            "DRIVER_SLOT": [each for slots, *_ in solved.drives() for each in slots[:3]],
+            "DRIVER_UNIT": [factor for *_, factor in solved.drives()],
+            "DRIVER_DESIGN": [mechanism.design_value(name) for name in solved.drivers],
+        }
     return {
         **standing,
         **motions,
@@ -453,7 +516,10 @@ def tables(solved: SolvedCase) -> dict[str, Sequence[float]]:
     }
 
 
-def words_of(solved: SolvedCase) -> tuple[list[str], list[str]]:
-    """Return the names of the outputs and of the parameters, with their units."""
-    outputs = [with_unit(each.quantity.name, each.quantity.unit) for each in solved.outputs]
-    return outputs, [with_unit(each.name, each.unit) for each in solved.parameters]
+def words_of(solved: SolvedCase) -> dict[str, list[str]]:
+    """Return the names of outputs, parameters and drivers, with their units."""
+    outputs = [(each.quantity.name, each.quantity.unit) for each in solved.outputs]
+    parameters = [(each.name, each.unit) for each in solved.parameters]
+    drivers = [(name, solved.unit(name)) for name in solved.drivers]
+    found = {"outputs": outputs, "parameters": parameters, "drivers": drivers}
+    return {what: [with_unit(*each) for each in named] for what, named in found.items()}

@@ -1,7 +1,8 @@
 """A solved case as a functional mock-up unit, FMI 2 or 3: the C code with its sources, and a binary
 where a compiler is there.
 
-The driver and its rate are inputs; a case driven by time has none. Beyond a lock-up the unit
+The driver and its rate are inputs; so are those of the other drivers, if they hold their values. A
+case driven by time has none. Beyond a lock-up the unit
 returns Discard and no numbers.
 """
 
@@ -22,6 +23,7 @@ from xml.sax.saxutils import quoteattr
 
 from ...case.case import TIME, Case
 from ...errors import KincheckError
+from ...mechanism.motions import Ramp
 from .c import header, identifier, source
 from .solved import SolvedCase, solved_case
 
@@ -41,14 +43,19 @@ WRAPPER = r"""
 #define API __attribute__((visibility("default")))
 #endif
 typedef double R;
-enum {{ OUT = {outputs}, PARAMETERS = {parameters}, FIRST = 3 + PARAMETERS }};
+enum {{ OUT = {outputs}, PARAMETERS = {parameters}, DRIVERS = {drivers} }};
+enum {{ OWN = 1 + 2 * DRIVERS, FIRST = OWN + PARAMETERS }};
 enum {{ LAST = FIRST + 3 * OUT }};
 enum {{ OK, WARNING, DISCARD, ERROR }};
-typedef struct {{ R time, driver, rate, *out; int known, failed; void *state; }} M;
+typedef struct {{
+  R time, driver[DRIVERS], rate[DRIVERS], *out; int known, failed; void *state;
+}} M;
 
 static void begin(M *m) {{
+  const R driver[] = {{{start}}}, rate[] = {{{rate}}};
   {n}_start(m->state);
-  m->time = 0.0; m->driver = {start}; m->rate = {rate}; m->known = 0;
+  memcpy(m->driver, driver, sizeof(driver)); memcpy(m->rate, rate, sizeof(rate));
+  m->time = 0.0; m->known = 0;
 }}
 static M *made(void) {{
   M *m = calloc(1, sizeof(M));
@@ -59,7 +66,7 @@ static M *made(void) {{
 }}
 static void freed(M *m) {{ if (m) {{ free(m->state); free(m->out); free(m); }} }}
 static int solved(M *m) {{
-  if (!m->known) m->failed = {n}_move(m->state, {driver}, m->rate, m->out);
+  if (!m->known) m->failed = {n}_{moved}, m->out);
   m->known = 1;
   return m->failed ? DISCARD : OK;
 }}
@@ -70,9 +77,8 @@ static int get(M *m, const unsigned *which, size_t n, R *x) {{
     unsigned i = which[k];
     if (i >= LAST) return ERROR;
     if (i == 0) x[k] = m->time;
-    else if (i == 1) x[k] = m->driver;
-    else if (i == 2) x[k] = m->rate;
-    else if (i < FIRST) x[k] = ((R *)m->state)[{n}_size() / sizeof(R) - 1 - PARAMETERS + i - 3];
+    else if (i < OWN) x[k] = (i % 2 ? m->driver : m->rate)[(i - 1) / 2];
+    else if (i < FIRST) x[k] = ((R *)m->state)[{n}_size() / sizeof(R) - 1 - PARAMETERS + i - OWN];
     else if ((status = solved(m)) != OK) return status;
     else x[k] = m->out[i - FIRST];
   }}
@@ -83,9 +89,8 @@ static int set(M *m, const unsigned *which, size_t n, const R *x) {{
   for (k = 0; k < n; k++) {{
     unsigned i = which[k];
     if (i == 0 || i >= FIRST) return ERROR;
-    if (i == 1) m->driver = x[k];
-    else if (i == 2) m->rate = x[k];
-    else {n}_set(m->state, (int)i - 3, x[k]);
+    if (i < OWN) (i % 2 ? m->driver : m->rate)[(i - 1) / 2] = x[k];
+    else {n}_set(m->state, (int)i - OWN, x[k]);
   }}
   m->known = 0;
   return OK;
@@ -251,35 +256,38 @@ def files(
 
 def wrapper(solved: SolvedCase, name: str, fmi: int, token: str) -> str:
     """Return the functions of the standard around the code."""
-    sweep = solved.case.sweep
-    by_time = sweep.driver == TIME
+    by_time, inputs = solved.case.sweep.driver == TIME, _inputs(solved)
+    given = "driver, m->rate" if len(inputs) > 1 else "driver[0], m->rate[0]"
+    every = "move_all" if len(inputs) > 1 else "move"
+    given = "time, 1.0" if by_time else given
     return (WRAPPER + (FMI2 if fmi == 2 else FMI3)).format(
         n=name,
         outputs=len(solved.outputs),
         parameters=len(solved.parameters),
-        start=repr(0.0 if by_time else float(sweep.design)),
-        rate=repr(1.0 if by_time else float(sweep.pace)),
-        driver="m->time" if by_time else "m->driver",
+        drivers=len(inputs),
+        start=", ".join(repr(design) for _, design, _ in inputs),
+        rate=", ".join(repr(rate) for *_, rate in inputs),
+        moved=f"{every}(m->state, m->{given}",
         token=f'"{token}"',
     )
 
 
 def description(solved: SolvedCase, name: str, fmi: int, token: str) -> str:
     """Return modelDescription.xml."""
-    sweep, by_time = solved.case.sweep, solved.case.sweep.driver == TIME
+    by_time, given = solved.case.sweep.driver == TIME, _inputs(solved)
     variables = [_variable(fmi, 0, "time", "independent", "continuous", "s")]
-    if not by_time:
-        unit = solved.driver_unit
-        start, rate = repr(float(sweep.design)), repr(float(sweep.pace))
-        variables += [
-            _variable(fmi, 1, sweep.driver, "input", "continuous", unit, start),
-            _variable(fmi, 2, f"{sweep.driver}.velocity", "input", "continuous", f"{unit}/s", rate),
-        ]
+    for k, (driver, *starts) in enumerate([] if by_time else given):
+        for order, (ending, start) in enumerate(zip(("", ".velocity"), starts, strict=True)):
+            name_of, unit = driver + ending, solved.unit(driver) + "/s" * order
+            variables.append(
+                _variable(fmi, 1 + 2 * k + order, name_of, "input", "continuous", unit, repr(start))
+            )
+    own = 1 + 2 * len(given)
     variables += [
-        _variable(fmi, 3 + k, each.name, "parameter", "tunable", each.unit, repr(each.nominal))
+        _variable(fmi, own + k, each.name, "parameter", "tunable", each.unit, repr(each.nominal))
         for k, each in enumerate(solved.parameters)
     ]
-    first, inputs = 3 + len(solved.parameters), [] if by_time else [1, 2]
+    first, inputs = own + len(solved.parameters), [] if by_time else [*range(1, own)]
     outputs: list[int] = []
     for k, each in enumerate(solved.outputs):
         for order, ending in enumerate(("", ".velocity", ".acceleration")):
@@ -297,8 +305,7 @@ def description(solved: SolvedCase, name: str, fmi: int, token: str) -> str:
         )
     )
     # FMI 2 counts variables from one in their order, FMI 3 names their references
-    index = {k: 1 + (0 if by_time else 2) + k - 2 for k in range(3, first + len(outputs))}
-    index |= {1: 2, 2: 3}
+    index = {k: k + 1 - (2 if by_time else 0) for k in range(1, first + len(outputs))}
     if fmi == 2:
         known = " ".join(str(index[k]) for k in inputs)
         told = "".join(f'<Unknown index="{index[k]}" dependencies="{known}"/>' for k in outputs)
@@ -321,6 +328,20 @@ def description(solved: SolvedCase, name: str, fmi: int, token: str) -> str:
         f"<ModelVariables>{''.join(variables)}</ModelVariables>"
         f"<ModelStructure>{structure}</ModelStructure></fmiModelDescription>\n"
     )
+
+
+def _inputs(solved: SolvedCase) -> list[tuple[str, float, float]]:
+    """Return the drivers that are inputs, with value and rate at the start; time for none."""
+    sweep, mechanism = solved.case.sweep, solved.case.mechanism
+    if sweep.driver == TIME:
+        return [(TIME, 0.0, 1.0)]
+    swept = (sweep.driver, float(sweep.design), float(sweep.pace))
+    if any(motion != Ramp(0.0) for motion in sweep.motions.values()):
+        return [swept]  # others follow it
+    return [
+        swept if name == sweep.driver else (name, mechanism.design_value(name), 0.0)
+        for name in solved.drivers
+    ]
 
 
 def _variable(

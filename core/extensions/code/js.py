@@ -33,13 +33,13 @@ class Mechanism {{
   move(driver, rate, outputs, most = HALVINGS) {{
     const [s, w, n] = this.lanes, goal = (driver - DESIGN) / PACE, r = rate / PACE;
     if (!Number.isFinite(goal) || !Number.isFinite(r) || !(this.values[PARAMETERS] > 0)) return 1;
-    copy(w, s);
+    copy(w, s);{again}
     const failed = travel(w, n, goal, most);
     if (failed) return failed;
     copy(s, w);
     tell(s, outputs, r);
     return 0;
-  }}
+  }}{steer}
   parameters() {{ return PARAMETERS; }}
   parameter(which) {{ return PARAMETER_NAMES[which] ?? ""; }}
   nominal(which) {{ return NOMINAL[which] ?? NaN; }}
@@ -54,12 +54,23 @@ class Mechanism {{
 """
 EXPORT = "export { Mechanism, Mechanism as default };\n"
 STAND = """
-    const s = this.lanes[0];
-    copy(s, START);
-    for (let k = 0; k < PARAMETERS; k++) move_geometry(s, k, this.values[k] - NOMINAL[k]);
-    this.values[PARAMETERS] = assemble(s);
-    begin(s);
+    this.values[PARAMETERS] = place(this.lanes[0], this.values);
   """
+STEER = """
+  drivers() { return DRIVERS; }
+  driver(which) { return DRIVER_NAMES[which] ?? ""; }
+  /* all drivers to values of their own, by a straight way from their present ones; move begins at
+     the design position again */
+  moveAll(drivers, rates, outputs) {
+    const [s, w, n] = this.lanes;
+    if (![...drivers, ...rates].every(Number.isFinite) || !(this.values[PARAMETERS] > 0)) return 1;
+    copy(w, s);
+    const failed = steer(w, n, drivers);
+    if (failed) return failed;
+    copy(s, w);
+    tell_at(s, outputs, rates);
+    return 0;
+  }"""
 
 
 def files(case: Case, places: Sequence[str], *, forces: bool = False) -> Mapping[str, bytes]:
@@ -68,17 +79,15 @@ def files(case: Case, places: Sequence[str], *, forces: bool = False) -> Mapping
     Raises:
         KincheckError: the case has a part that the code cannot have.
     """
-    text = (
-        source(solved_case(case, places, forces=forces))
-        + "export { Mechanism, Mechanism as default };\n"
-    )
+    text = source(solved_case(case, places, forces=forces)) + EXPORT
     return {f"{identifier(case.name)}.mjs": text.encode()}
 
 
 def source(solved: SolvedCase) -> str:
     """Return the text of the class `Mechanism`, and all that it takes."""
     known = tables(solved) | {"NOMINAL": [each.nominal for each in solved.parameters]}
-    outputs, parameters = words_of(solved)
+    words = words_of(solved)
+    again = "place(w, this.values)" if solved.parameters else "{ copy(w, START); begin(w); }"
     return "\n".join(
         [
             f"/* {solved.case.name}, written by kincheck: lengths in m, angles in rad */",
@@ -87,10 +96,15 @@ def source(solved: SolvedCase) -> str:
                 JAVASCRIPT.table.format(name=table, numbers=", ".join(map(repr, values)))
                 for table, values in known.items()
             ),
-            f"const NAMES = {json.dumps(outputs)};",
-            f"const PARAMETER_NAMES = {json.dumps(parameters)};",
+            f"const NAMES = {json.dumps(words['outputs'])};",
+            f"const PARAMETER_NAMES = {json.dumps(words['parameters'])};",
+            f"const DRIVER_NAMES = {json.dumps(words['drivers'])};",
             "",
             JAVASCRIPT.text(steps_text(solved)),
-            CLASS.format(stand=STAND if solved.parameters else ""),
+            CLASS.format(
+                stand=STAND if solved.parameters else "",
+                again=f"\n    if (w[STEERED] > 0) {again};" if solved.is_steered else "",
+                steer=STEER if solved.is_steered else "",
+            ),
         ]
     )

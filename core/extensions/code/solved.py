@@ -43,7 +43,7 @@ from ...kinematics.compiled.request import (
 from ...kinematics.continuation.segments import BETTER, NEAR, Followed
 from ...kinematics.continuation.walk import follow_samples
 from ...kinematics.formulation.acceptance_criteria import LOW
-from ...mechanism.motions import Absolute, Motion, Ramp, Sine, Table
+from ...mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
 from ...program import DONE, MARGIN, Program, Tape, program, where_larger
 from ...trajectory import QUANTITIES
 from ..sweep.curves import moved_by
@@ -112,10 +112,21 @@ class SolvedCase:
     """Slots of origin [m] and Euler parameters, by body."""
     others: Sequence[Model]
     """Models with other choices of the independent rows, where one does not hold over the sweep."""
+    is_steered: bool
+    """Whether each driver can be moved to a value of its own."""
 
     @property
     def size(self) -> int:
-        """Numbers of a lane: the slots, the time, and the kept numbers of outputs."""
+        """Numbers of a lane: the slots, the time, the kept numbers of outputs, and the straight
+        way of the drivers.
+        """
+        return self.steered + (1 + 2 * len(self.drives()) if self.is_steered else 0)
+
+    @property
+    def steered(self) -> int:
+        """The number of a lane that tells whether the drivers go a straight way; where it begins,
+        and the change, follow by driver.
+        """
         kept = [each.kept + (4 if each.completion else 1) for each in self.outputs if each.kept]
         return max([self.at + 2, *kept])
 
@@ -211,34 +222,45 @@ class SolvedCase:
             "CONSISTENT": CONSISTENT,
             "NEAR": NEAR,
             "BETTER": BETTER,
+            "STEERED": self.steered,
+            "DRIVERS": len(self.drives()),
             "OUTPUTS": len(self.outputs),
             "PARAMETERS": len(self.parameters),
             "DESIGN": 0.0 if sweep.driver == SWEPT_TIME else sweep.design,
             "PACE": 1.0 if sweep.driver == SWEPT_TIME else sweep.pace,
         }
 
-    @property
-    def driver_unit(self) -> str:
-        """Unit of the driver's value."""
-        driver = self.case.sweep.driver
+    def unit(self, driver: str) -> str:
+        """Return the unit of a driver, or of time."""
         if driver == SWEPT_TIME:
             return "s"
         return "rad" if self.case.mechanism.driver(driver).turns else "m"
+
+    @property
+    def drivers(self) -> list[str]:
+        """Names of the moving drivers, in the case's order."""
+        moving = self.case.sweep.path.motions
+        return [each.name for each in self.case.mechanism.drivers if each.name in moving]
 
     def drives(self) -> list[tuple[Sequence[int], Motion, float]]:
         """Return for each moving driver its five slots, its motion from the design, and the factor
         from SI to the unit of the slots.
         """
-        found: list[tuple[Sequence[int], Motion, float]] = []
-        for name, motion in self.case.sweep.path.motions.items():
-            turns = self.case.mechanism.driver(name).turns
-            factor = 1.0 if turns else 1.0 / self.model.frame.unit
-            found.append((self.model.vectors[f"drive {name}"], motion, factor))
-        return found
+        motions, length = self.case.sweep.path.motions, 1.0 / self.model.frame.unit
+        return [
+            (self.model.vectors[f"drive {name}"], motions[name], factor)
+            for name in self.drivers
+            for factor in [1.0 if self.unit(name) == "rad" else length]
+        ]
 
 
 def solved_case(
-    case: Case, places: Sequence[str], bodies: Sequence[str] = (), *, forces: bool = False
+    case: Case,
+    places: Sequence[str],
+    bodies: Sequence[str] = (),
+    *,
+    forces: bool = False,
+    steered: Sequence[Path] = (),
 ) -> SolvedCase:
     """Return a case ready to be written as code.
 
@@ -246,10 +268,17 @@ def solved_case(
         places: names of the parameters, see `kincheck.curves`.
         bodies: names of those whose poses are wanted.
         forces: whether the code has the outputs of forces.
+        steered: further paths, of all drivers, on which redundant rows are exchanged. With them,
+            or with several drivers, each driver can be moved to a value of its own.
 
     Raises:
         KincheckError: the case has a part that the code cannot have, or a place is unknown.
     """
+    names = [each.name for each in case.mechanism.drivers]
+    if is_steered := bool(steered) or len(names) > 1:
+        held = {name: Ramp(0.0) for name in names if name not in case.sweep.path.motions}
+        motions = {**case.sweep.motions, **held}
+        case = replace(case, sweep=replace(case.sweep, motions=motions))
     path = case.sweep.path
     for name, motion in path.motions.items():
         plain = motion.motion if isinstance(motion, Absolute) else motion
@@ -297,9 +326,10 @@ def solved_case(
     }
     others = [
         recent_model(model.mechanism, replace(model.request, rows=rows))
-        for rows in _other_rows(case, model)
+        for rows in _other_rows(case, model, [path, *steered])
     ]
-    return SolvedCase(case, model, outputs, parameters, route.begin.time, poses, others)
+    begin = route.begin.time
+    return SolvedCase(case, model, outputs, parameters, begin, poses, others, is_steered)
 
 
 def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:
@@ -314,20 +344,11 @@ def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:
             f"{case.name}: the forces of this mechanism are none that code can have. Leave --forces"
             " out."
         )
-    if model.selection.dropped:
-        solver = NativeSolver()
-        found = solver.prepare(case.mechanism, case.sweep.path, case.points, (), case.forces)(TOL)
-        loose = [
-            each.name
-            for each in case.outputs
-            if each.forces
-            and np.isnan(output_series(case, each, found).position[found.solved]).any()
-        ]
-        if loose:
-            raise KincheckError(
-                f"{case.name}: redundant rows leave {shortened(loose, 5)} undetermined, as"
-                " kincheck run tells. Leave these outputs out, or --forces."
-            )
+    if model.selection.dropped and (loose := loose_forces(case)):
+        raise KincheckError(
+            f"{case.name}: redundant rows leave {shortened(loose, 5)} undetermined, as kincheck"
+            " run tells. Leave these outputs out, or --forces."
+        )
     names = [f"{REACTION}{each}" for each in wanted.joints]
     names += [f"{EFFORT}{each}" for each in wanted.drivers]
     names += [f"{ELEMENT}{each}" for each in wanted.elements]
@@ -353,15 +374,27 @@ def _pushes(case: Case, model: Model) -> dict[str, dict[int, float]]:
     }
 
 
-def _other_rows(case: Case, model: Model) -> list[tuple[int, ...]]:
-    """Return the further choices of independent rows that native takes over the sweep."""
+def loose_forces(case: Case) -> list[str]:
+    """Return the names of the outputs of forces that are undetermined somewhere on the sweep."""
+    solver = NativeSolver()
+    found = solver.prepare(case.mechanism, case.sweep.path, case.points, (), case.forces)(TOL)
+    forces = [each for each in case.outputs if each.forces]
+    values = {each.name: output_series(case, each, found).position for each in forces}
+    return [name for name, each in values.items() if np.isnan(each[found.solved]).any()]
+
+
+def _other_rows(case: Case, model: Model, paths: Sequence[Path]) -> list[tuple[int, ...]]:
+    """Return the further choices of independent rows that native takes on paths."""
     if not model.selection.dropped:
         return []
-    route = DesignOutputs.of(case, (), derivative=2).designs.route
-    followed = Followed(route, follow_samples(route, TOL, low=LOW), TOL)
-    followed.go_on()
-    followed.renew(followed.visit(np.flatnonzero(followed.needs_check).tolist()))
-    return [each.selection.chosen for each in followed.models[1:]]
+    made, found = DesignOutputs.of(case, (), derivative=2), dict[tuple[int, ...], None]()
+    for path in paths:
+        route = made.on_path(path).designs.route
+        followed = Followed(route, follow_samples(route, TOL, low=LOW), TOL)
+        followed.go_on()
+        followed.renew(followed.visit(np.flatnonzero(followed.needs_check).tolist()))
+        found |= dict.fromkeys(each.selection.chosen for each in followed.models[1:])
+    return [*found]
 
 
 def _nominal(geometry: Geometry, name: str) -> float:

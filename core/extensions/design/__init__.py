@@ -6,7 +6,8 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["compare", "hardpoints", "sweep"],
+    needs=["compare", "compliance", "hardpoints", "sweep"],
     commands={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},
+    proposals={"tune": "proposal:propose"},
     public={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},
 )

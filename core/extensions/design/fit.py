@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from itertools import combinations as pairs
 from math import erfc, log
 from pathlib import Path
@@ -20,10 +21,11 @@ from ...errors import KincheckError, unknown
 from ...harness.suspects import FACTORS
 from ...report.axis import ZERO
 from ...trajectory import Array
-from .goals import read_box, read_moves
+from .goals import Movable, points_of, read_box, read_moves, travel_of
 from .identify import Combination, combinations, source, without_effect
 from .likely import Estimate, most_likely
 from .rig import ROUND_OFF, Rig, RigModel, read_rig, with_scatter
+from .rubber import PERCENT, rates_of
 
 ALPHA = 0.01
 """Data are off, if such ones have a smaller probability."""
@@ -162,7 +164,7 @@ class Fitted:
     def told_at(self, prediction: Prediction) -> int:
         """Return the sample to tell of: the one nearest to design, unless all is known there."""
         drawn = np.nan_to_num(prediction.drawing)
-        order = np.argsort(np.abs(self.rig.travel(self.rig.goals[0])[1]), kind="stable")
+        order = np.argsort(np.abs(self.rig.case.sweep.values), kind="stable")
         return next(int(k) for k in order if drawn[k] > 0.01 * drawn.max())
 
     @property
@@ -198,7 +200,8 @@ def fit(
         KincheckError: the file or an option makes no sense, or the table does not reach the travel
             of the rig.
     """
-    boxes = _boxes(case, drawing, moves)
+    soft = bool(case.mechanism.bushings)
+    boxes = _boxes(rates_of(case) if soft else points_of(case), drawing, moves)
     return fit_rig(read_rig(case, file, options), boxes, free, every=not moves)
 
 
@@ -220,17 +223,19 @@ def fit_rig(
             f"{rig.file}: a measured output has no slope by the points of {rig.case.name} at a"
             " sample; leave its column out"
         )
-    # at a drawing with round numbers an effect may be zero by chance
-    near = model(np.random.default_rng(0).uniform(-0.5, 0.5, len(boxes))) or given
-    size = np.abs(near[1]).max(axis=0)
-    idle = [place for place, x in zip(boxes, size, strict=True) if x <= ROUND_OFF * size.max()]
-    if idle and every:
+    idle = list[str]()
+    if every:  # at a drawing with round numbers an effect may be zero by chance
+        near = model(np.random.default_rng(0).uniform(-0.5, 0.5, len(boxes))) or given
+        size = np.abs(near[1]).max(axis=0)
+        idle = [
+            x for x, known in zip(boxes, size > ROUND_OFF * size.max(), strict=True) if not known
+        ]
         boxes = {place: box for place, box in boxes.items() if place not in idle}
         model = rig.model(boxes)
     if not boxes:
         raise KincheckError(f"{rig.file}: nothing measured follows a point of {rig.case.name}")
 
-    freed = _named(free, [*_offsets(model, _estimate(model, []))])
+    freed = _named(free, [*_offsets(model, _estimate(model, []))]) if free else []
     first = estimate = _estimate(model, freed)
     slips = [*_slips(model, first)] if first.probability < ALPHA else []
     found = list[Shift]()
@@ -254,15 +259,14 @@ def fit_rig(
         [_alone(each, k, every_shift, estimate) for k, each in enumerate(found, len(freed))],
         *(worst.words, slips or [*_slips(model, estimate)], combinations(estimate, boxes)),
         without_effect(*model.over_travel(estimate.u), rig.case, moves, box),
-        *(idle if every else (), predictions(model, estimate)),
+        *(idle, predictions(model, estimate)),
     )
 
 
-def _boxes(case: Case, drawing: str, moves: Sequence[str]) -> dict[str, float]:
-    usual = read_box(drawing, f"--drawing {drawing!r}", case)
-    rows = [each.name for each in case.hardpoints if each.moves]
-    every = {f"{row} {axis}": usual for row in rows for axis in "xyz"}
-    found = read_moves(moves, case, drawing) if moves else every
+def _boxes(movable: Movable, drawing: str, moves: Sequence[str]) -> dict[str, float]:
+    usual = read_box(drawing, f"--drawing {drawing!r}", movable)
+    every = {f"{row} {axis}": usual for row in movable.rows.values() for axis in "xyz"}
+    found = read_moves(moves, movable, drawing) if moves else every
     for place, box in found.items():
         if -box.low != box.high:
             raise KincheckError(f"move {place}: a deviation is the same both ways; say +- 2 mm")
@@ -282,25 +286,25 @@ def _offsets(model: RigModel, estimate: Estimate) -> Iterator[Shift]:
     values = rig.of(model.values(estimate.u))
     for goal in rig.goals:
         rows = rig.rows(goal) * rig.weights
-        yield Shift(f"{goal.output} zero", rows, 0.0, np.inf, rig.unit(goal), 1.0)
+        yield Shift(f"{goal.output} zero", rows, 0.0, np.inf, goal.unit, 1.0)
         if (rows * values).any():
             yield Shift(f"{goal.output} scale", rows * values, 0.0, np.inf, percent, 1.0)
     if (slopes := model.by_travel(estimate.u)) is not None:
         along = -slopes * rig.weights
         travel = np.array([rig.case.sweep.change[k] for _, k in rig.places])
-        yield Shift("travel zero", along, 0.0, np.inf, rig.travel(rig.goals[0])[2], 1.0)
+        yield Shift("travel zero", along, 0.0, np.inf, travel_of(rig.case)[1], 1.0)
         yield Shift("travel scale", along * travel, 0.0, np.inf, percent, 1.0)
 
 
 def _samples(rig: Rig) -> Iterator[Shift]:
     """Yield each number as a shift of its own."""
+    _, unit = travel_of(rig.case)
     for k, (goal, at) in enumerate(rig.places):
-        _, values, unit = rig.travel(goal)
-        where = f"{values[at] / unit.size:.4g} {unit.name}"
+        where = f"{rig.case.sweep.values[at] / unit.size:.4g} {unit.name}"
         direction = np.zeros(rig.count)
         direction[k] = rig.weights[k]
         name = f"{goal.output} at {where}"
-        yield Shift(name, direction, 0.0, np.inf, rig.unit(goal), 1.0)
+        yield Shift(name, direction, 0.0, np.inf, goal.unit, 1.0)
 
 
 def _sized(shift: Shift, estimate: Estimate) -> Shift:
@@ -333,13 +337,13 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
     slips = dict[str, Rig]()
     for goal in rig.goals:
         slips[f"{goal.output} negated"] = rig.times({goal.output: -1.0})
-        others = _LENGTHS if goal.unit[0] in ANGLES else _ANGLES
+        others = _LENGTHS if goal.unit.name in ANGLES else _ANGLES
         for name, factor in FACTORS.items():
             if any(each in name for each in others):
                 continue
             slips[f"{goal.output} times {name}"] = rig.times({goal.output: factor})
     for one, other in pairs(rig.goals, 2):
-        if one.unit == other.unit and one.at.tolist() == other.at.tolist():
+        if one.unit.name == other.unit.name and one.at.tolist() == other.at.tolist():
             middle = {one.output: other.middle, other.output: one.middle}
             goals = [replace(g, middle=middle.get(g.output, g.middle)) for g in rig.goals]
             slips[f"{one.output} and {other.output} exchanged"] = replace(rig, goals=goals)
@@ -355,7 +359,9 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
         free = estimate.free * (slipped.weights / rig.weights)[:, None]
         if _linear_misfit(replace(estimate, off=off, slopes=slopes)) > _HOPELESS * rig.count:
             continue
-        found = most_likely(changed, np.zeros(len(box)), free)
+        # a study of rates takes a hundred times as long as a design, so the slopes do
+        linear = partial(_linear, estimate.u, off, slopes) if rig.move is PERCENT else changed
+        found = most_likely(linear, np.zeros(len(box)), free)
         if found is not None and found.probability >= ALPHA:
             largest = float(np.abs(found.u).max())
             fits.append((found.evidence, Slip(name, found.probability, largest)))
@@ -366,6 +372,10 @@ def _slips(model: RigModel, estimate: Estimate) -> Iterator[Slip]:
     for each, slip in fits:
         if " times " not in slip.name or each <= best + LESS:
             yield slip
+
+
+def _linear(at: Array, off: Array, slopes: Array, u: Array) -> tuple[Array, Array]:
+    return off + slopes @ (u - at), slopes
 
 
 def _linear_misfit(estimate: Estimate) -> float:

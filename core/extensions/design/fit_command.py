@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from statistics import median
@@ -11,12 +12,11 @@ from ...case.io.reader_options import CurveOptions
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
 from ...errors import refuse
-from ...options import destination, group, json_file, option, options
+from ...options import destination, group, json_file, option, options, with_values
 
-DRAWING = "+- 2 mm"
+DRAWING, RATE = "+- 2 mm", "+- 30 %"
 
 if TYPE_CHECKING:
-    from ...case.case import Case
     from ...trajectory import Array
     from .fit import Fitted, Shift
 
@@ -44,10 +44,16 @@ class Fit(OfCase):
         metavar="MOVE",
         several="repeated",
     )
-    drawing: str = option(
-        "standard deviation of a coordinate from the drawing; default: %(default)s",
-        metavar="LENGTH",
-        default=DRAWING,
+    drawing: str | None = option(
+        f"standard deviation of a coordinate from the drawing; default: {DRAWING}, of the rate of a"
+        f" bushing {RATE}%",
+        metavar="SIZE",
+    )
+    bushings: Path | None = option(
+        "bushings of the table, as of kincheck kc: fit their rates to curves of kc, and leave the"
+        ' points as they are; a move is "lca_front: y +- 30 %%"',
+        Path,
+        "FILE",
     )
     free: tuple[str, ...] = option(
         'zero or scale that the rig does not know: "toe zero", "camber scale", "travel zero"; may'
@@ -67,14 +73,13 @@ class Fit(OfCase):
             KincheckError: a file or an option makes no sense, or the table does not reach the
                 travel of the rig.
         """
+        from .fit import fit
         from .new_table import table_of
 
-        return self._fitted(table_of(self, registry)[0])
-
-    def _fitted(self, case: Case) -> Fitted:
-        from .fit import fit
-
-        return fit(case, Path(self.measured), self.curve, self.drawing, self.move, self.free)
+        supplied = replace(self.supplied, bushings=self.bushings)
+        case = table_of(with_values(self, supplied=supplied), registry)
+        usual = self.drawing or (RATE if self.bushings else DRAWING)
+        return fit(case, Path(self.measured), self.curve, usual, self.move, self.free)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
@@ -83,22 +88,28 @@ class Fit(OfCase):
         from ...report.terminal import with_json
         from .fit import Verdict
         from .fit_views import page, report
-        from .new_table import require_new, table_of, write_new
+        from .new_table import NewTable, require_new
+        from .rubber import new_bushings
 
-        require_new(self.out)
+        require_new(self.out, ".toml" if self.bushings else ".csv")
         refuse(self.unwritable())
-        case, file = table_of(self, registry)
-        found = self._fitted(case)
+        found = self.answer(registry)
         fits, checked = found.verdict is not Verdict.OFF, None
         if fits and self.out is not None:
-            checked = write_new(self.out, case, file, self.supplied, found.moves, registry)
+            if self.bushings is not None:
+                text = new_bushings(self.bushings, found.rig.case, found.moves)
+                write("--out", self.out, text.encode())
+            else:
+                new = NewTable.of(self, found.rig.case, found.moves)
+                checked = new.check(registry)
+                new.write(self.out)
         if self.page is not None:
             write("--page", self.page, page(found).encode())
         with with_json(facts(found, self.out if fits else None, checked), self.json) as console:
             print_report(report(found), cast(TextIO, console.file))
             if fits and self.out is not None:
-                by = f"solved again by {checked}" if checked else "no other engine is installed"
-                print(f"\n{self.out}: written, {by}", file=console.file)
+                by = f", solved again by {checked}" if checked else ""
+                print(f"\n{self.out}: written{by}", file=console.file)
         return Status.WITHIN if fits else Status.DEVIATES
 
 

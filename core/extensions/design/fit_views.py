@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from ...errors import number_of, shortened
-from ...harness.scene import scene
-from ...report.axis import Axis
-from ...report.drawing import Drawing, drawing
 from ...report.figures import Figure, Style
 from ...report.page_model import Plot
-from ...report.sections import Diagram, Report, Section, environment, figure_parts
-from ...trajectory import Array
+from ...report.sections import Diagram, Report, Section
 from ...unit_text import with_unit
+from . import pages
 from .fit import ALPHA, NORMAL, Fitted, Verdict
-from .goals import Goal
+from .goals import travel_of
 from .identify import BETTER, Combination
+from .rubber import PERCENT
 
-DIGITS, TOLD = 6, 0.999
-# The longest drawn move, over the size of the mechanism.
-_LONGEST = 0.12
+TOLD = 0.999
 _RIG, _FIT, _DRAWING = (
     Style.number(k, name) for k, name in enumerate(("rig", "fitted table", "drawing"))
 )
@@ -60,19 +54,10 @@ def page(found: Fitted) -> str:
     """Return the page as one HTML file: the report, with pictures."""
     whole = report(found)
     first, *others = whole.sections
-    curves = Section("Curves and residuals", [], [], [], 0, [], _curves(found))
-    drawn, times = _moves(found)
+    curves = Section("Curves and residuals", [], [], [], 0, [], [*_curves(found)])
+    moves = {} if found.rig.move is PERCENT else found.moves
     whole = replace(whole, sections=[first, curves, *others])
-    figures = {
-        diagram.plot.figure: diagram.figure
-        for section in whole.sections
-        for diagram in section.diagrams
-    }
-    known = environment(Path(__file__).parent)
-    parts = figure_parts(figures, scenes={"moves": msgspec.to_builtins(drawn)})
-    text = known.get_template("bench.html").render(report=whole, scripted=True, **parts)
-    moves = known.get_template("fit_scene.html").render(times=times)
-    return text.replace("</main>", f"{moves}</main>", 1)
+    return pages.page(whole, found.rig.case, moves)
 
 
 def _verdict(found: Fitted) -> Section:
@@ -89,64 +74,27 @@ def _verdict(found: Fitted) -> Section:
     if found.estimate.probability < ALPHA:
         verdict.append("Nothing is estimated, since the table does not fit.")
     notes = [
-        f"Noise of {goal.output}: {np.median(noise) / unit.size:.2g} {unit.name}, {source}."
+        f"Noise of {goal.output}: {np.median(noise) / goal.unit.size:.2g} {goal.unit.name},"
+        f" {source}."
         for goal, noise, source in zip(rig.goals, rig.noise, rig.sources, strict=True)
-        for unit in [rig.unit(goal)]
     ]
     return Section("Verdict", verdict, [*notes, *rig.notes], [], 0, [])
 
 
-def _curves(found: Fitted) -> list[Diagram]:
+def _curves(found: Fitted) -> Iterator[Diagram]:
     rig, model = found.rig, found.rig.model(found.boxes)
-    fitted = model.values(found.estimate.u)
-    drawn = model.values(np.zeros(len(found.boxes)))
-    diagrams = list[Diagram]()
-    for goal, noise in zip(rig.goals, rig.noise, strict=True):
-        name, values, along = rig.travel(goal)
-        order = np.argsort(values[goal.at], kind="stable")
-        travel, unit = values[goal.at][order] / along.size, rig.unit(goal).size
-
-        every = [_of(goal, each)[order] / unit for each in (drawn, fitted)]
-        measured = goal.middle[order] / unit
-        curves = [
-            *(
-                _line(style, travel, each)
-                for style, each in zip((_DRAWING, _FIT), every, strict=True)
-            ),
-            _line(_RIG, travel, measured) | {"mode": "markers"},
-        ]
-        half = NORMAL * noise[order] / unit
-        band: Figure = {
-            "type": "scatter",
-            "mode": "lines",
-            "x": _short(np.concatenate([travel, travel[::-1]])),
-            "y": _short(np.concatenate([half, -half[::-1]])),
-            "fill": "toself",
-            "fillcolor": "rgba(128,128,128,0.18)",
-            "line": {"width": 0},
-            "hoverinfo": "skip",
-            "uid": _RIG.key,
-            "name": "noise of the rig",
-        }
-        rest = _line(_RIG, travel, measured - every[1]) | {"mode": "markers"}
-        for what, data in (("", curves), (" less the fitted table", [band, rest])):
-            title = with_unit(goal.output + what, rig.unit(goal).name)
-            layout: Figure = {
-                "xaxis": {"title": {"text": with_unit(name, along.name)}},
-                "yaxis": {"title": {"text": title}, "zeroline": True},
-                "hovermode": "x unified",
-            }
-            plot = Plot(f"curve-{len(diagrams)}", title, "Band: noise of the rig." if what else "")
-            diagrams.append(Diagram(plot, {"data": data, "layout": layout}, [_RIG, _FIT, _DRAWING]))
-    return diagrams
-
-
-def _line(style: Style, x: Array, y: Array) -> Figure:
-    return style.curve(_short(x), _short(y), size=6)
-
-
-def _of(goal: Goal, values: Mapping[str, Array]) -> Array:
-    return values[goal.output][goal.at]
+    drawn, fitted = (model.values(u) for u in (np.zeros(len(found.boxes)), found.estimate.u))
+    for k, (goal, noise) in enumerate(zip(rig.goals, rig.noise, strict=True)):
+        old, new = (each[goal.output] for each in (drawn, fitted))
+        measured, half = (
+            pages.whole(goal, each, rig.case) for each in (goal.middle, NORMAL * noise)
+        )
+        curves = [(_DRAWING, old, "lines"), (_FIT, new, "lines"), (_RIG, measured, "markers")]
+        band = measured - half, measured + half, "noise of the rig"
+        yield pages.over_travel(2 * k, goal.output, goal.unit, rig.case, curves, band)
+        rest = [(_RIG, measured - new, "markers")]
+        what, around = f"{goal.output} less the fitted table", (-half, half, band[2])
+        yield pages.over_travel(2 * k + 1, what, goal.unit, rig.case, rest, around)
 
 
 def _combinations(found: Fitted) -> Section:
@@ -159,7 +107,7 @@ def _combinations(found: Fitted) -> Section:
     bars: Figure = {
         "type": "bar",
         "x": [*range(1, len(every) + 1)],
-        "y": _short(np.log10(gain)),
+        "y": [round(float(x), 4) for x in np.log10(gain)],
         "width": [0.8] * len(every),
         "name": "power of ten",
         "marker": {"color": style.colour},
@@ -191,10 +139,11 @@ def _row(each: Combination, size: float) -> list[str]:
 
 def _predictions(found: Fitted) -> Section:
     rows = list[list[str]]()
-    _, travel, along = found.rig.travel(found.rig.goals[0])
+    case = found.rig.case
+    _, along = travel_of(case)
     for name, each in found.predictions.items():
         unit, k = found.rig.unit_of(name), found.told_at(each)
-        where = f"{travel[k] / along.size:.4g} {along.name}"
+        where = f"{case.sweep.values[k] / along.size:.4g} {along.name}"
         value, half, drawn = (x[k] / unit.size for x in (each.values, each.spread, each.drawing))
         texts = [f"{value:.5g}", f"{NORMAL * half:.2g}", f"{NORMAL * drawn:.2g}"]
         rows.append([with_unit(name, unit.name), where, *texts, each.source])
@@ -223,38 +172,3 @@ def _coordinates(found: Fitted) -> Section:
     ]
     heads = ["coordinate", f"moved [{unit.name}]", "±", "± by the drawing", "source"]
     return Section("Coordinates", [], [], heads, 1, rows)
-
-
-def _moves(found: Fitted) -> tuple[Drawing, str]:
-    """Return the drawing with a bar along the move of each point, and how many times too long."""
-    case, moves = found.rig.case, found.moves
-    axis = Axis("travel", "", 1.0, [], "", [], 0, [])
-    drawn = drawing(scene(case, poses=False), axis)
-    at = {each.name: np.array(each.position) for each in case.hardpoints}
-    ways = {
-        each.name: sum(
-            (
-                sign * moves.get(f"{each.name} {name}", 0.0) * np.eye(3)[k]
-                for name, (k, sign) in zip("xyz", each.axes, strict=True)
-            ),
-            np.zeros(3),
-        )
-        for each in case.hardpoints
-    }
-    size = float(np.ptp(np.array([*at.values()]), axis=0).max())
-    longest = max((float(np.linalg.norm(each)) for each in ways.values()), default=0.0)
-    times = float(f"{_LONGEST * size / longest:.1g}") if longest > 0.0 else 1.0
-    for name, way in ways.items():
-        if way.any():
-            first = len(drawn.nodes)
-            for place in (at[name], at[name] + times * way):
-                drawn.nodes.append((0, *place.tolist()))
-            drawn.rods.append((first, first + 1))
-            length = np.linalg.norm(way) / found.rig.move.size
-            text = f"{name} {length:.2g} {found.rig.move.name}"
-            drawn.labels.append((first + 1, first + 1, text))
-    return drawn, f"{times:g}"
-
-
-def _short(values: Sequence[float] | Array) -> list[float]:
-    return [float(f"{x:.{DIGITS}g}") for x in values]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...case.case import Case
+from ...case.case import TIME, Case
 from ...case.io.document import measure
 from ...case.io.reader_options import CurveOptions
 from ...case.io.reference_curve import with_curve
 from ...case.io.table import read_unit
 from ...case.models.files import load
-from ...case.units import LENGTHS, Unit
+from ...case.units import LENGTHS, SECOND, Unit
 from ...cli.shared_options import driver_value
 from ...errors import CaseError, KincheckError, unknown
 from ...trajectory import Array
@@ -44,7 +44,7 @@ class Goal:
 
     Attributes:
         text: as the user wrote it.
-        unit: in which the user gave it, and its size [SI].
+        unit: in which the user gave it.
         at: indices of the samples at which the band holds.
         middle: of the band at these samples [SI].
         tolerance: half-width of the band [SI].
@@ -52,7 +52,7 @@ class Goal:
 
     text: str
     output: str
-    unit: tuple[str, float]
+    unit: Unit
     at: NDArray[np.intp]
     middle: Array
     tolerance: float
@@ -93,7 +93,7 @@ def read_goals(
         KincheckError: a goal has another form, there is no such output, or a travel or a curve lies
             beyond the sweep.
     """
-    drafts = [_draft(text, case) for text in texts]
+    drafts = [each for text in texts for each in _drafts(text, case)]
     values, span = case.sweep.values, sorted((case.sweep.values[0], case.sweep.values[-1]))
     for each in drafts:
         if each.travel is None or np.abs(values - each.travel).min() <= SAME:
@@ -124,12 +124,31 @@ def read_goals(
                 f"goal {each.text!r}: the curve has no value within the travel; give another"
                 " --travel"
             )
-        unit_name = each.unit.name, each.unit.size
-        goals.append(Goal(each.text, each.output, unit_name, whole, middle[whole], each.tolerance))
+        goals.append(Goal(each.text, each.output, each.unit, whole, middle[whole], each.tolerance))
     return case, goals, notes
 
 
-def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, Box]:
+@dataclass(frozen=True)
+class Movable:
+    """What may move: its rows by all their names, and the units of its boxes.
+
+    Attributes:
+        bare: unit of a box without one.
+    """
+
+    rows: Mapping[str, str]
+    units: Mapping[str, Unit]
+    bare: str
+
+
+def points_of(case: Case) -> Movable:
+    """Return the points of a table that something follows."""
+    moving = [each for each in case.hardpoints if each.moves]
+    rows = {role: each.name for each in moving for role in each.roles}
+    return Movable(rows | {each.name: each.name for each in moving}, LENGTHS, case.length_unit)
+
+
+def read_moves(texts: Sequence[str], movable: Movable, usual: str = "") -> dict[str, Box]:
     """Return the box of each place to move.
 
     Args:
@@ -138,9 +157,6 @@ def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, B
     Raises:
         KincheckError: a move has another form, there is no such row, or it is given twice.
     """
-    rows = {role: each.name for each in case.hardpoints for role in each.roles}
-    rows |= {each.name: each.name for each in case.hardpoints}
-    moving = {each.name for each in case.hardpoints if each.moves}
     found = dict[str, Box]()
     for text in texts:
         read = _MOVE.fullmatch(text)
@@ -149,43 +165,42 @@ def read_moves(texts: Sequence[str], case: Case, usual: str = "") -> dict[str, B
                 f"move {text!r}: expected points, axes and a box; say {MOVE}, such as"
                 ' "tierod_inner: y z +- 15 mm"'
             )
-        box = read_box(read["box"] or usual, f"move {text!r}", case)
+        box = read_box(read["box"] or usual, f"move {text!r}", movable)
         for name in re.split(r"\s*,\s*", read["points"]):
-            if name not in rows:
-                raise KincheckError(f"move {text!r}: {unknown('point', name, rows)}")
-            if rows[name] not in moving:
-                raise KincheckError(
-                    f"move {text!r}: nothing of the suspension follows {name}; leave it out"
-                )
+            if name not in movable.rows:
+                raise KincheckError(f"move {text!r}: {unknown('point', name, movable.rows)}")
             for axis in re.findall("[xyz]", read["axes"] or "xyz"):
-                if (place := f"{rows[name]} {axis}") in found:
+                if (place := f"{movable.rows[name]} {axis}") in found:
                     raise KincheckError(f"move {text!r}: {place} is given twice; leave one out")
                 found[place] = box
     return found
 
 
-def read_box(text: str, what: str, case: Case) -> Box:
+def read_box(text: str, what: str, movable: Movable) -> Box:
     """Return a box: "+- 15 mm", or "+5 -10 mm".
 
     Raises:
-        KincheckError: it is no positive length.
+        KincheckError: it is no positive number with a unit.
     """
     found, low, high = _BOX.fullmatch(text.strip()), np.nan, np.nan
     if found is not None:
         with suppress(ValueError):
-            lower, unit = measure(found["both"] or found["low"] or "", LENGTHS, case.length_unit)
-            bare = unit or case.length_unit
-            low = -lower
-            high = lower if found["high"] is None else LENGTHS[bare](float(found["high"]))
+            both = found["both"] or found["low"] or ""
+            lower, unit = measure(both, movable.units, movable.bare)
+            low, high = -lower, lower
+            if found["high"] is not None:
+                high = movable.units[unit or movable.bare](float(found["high"]))
     if not (-np.inf < low <= 0.0 <= high < np.inf and low < high):
         raise KincheckError(
-            f"{what}: found the box {text!r}, expected a positive length with a unit; say +- 15"
-            f" {case.length_unit}, or +5 -10 {case.length_unit}"
+            f"{what}: found the box {text!r}, expected a positive number of"
+            f" {' or '.join([*movable.units][:3])}; say +- 15 {movable.bare}, or +5 -10"
+            f" {movable.bare}"
         )
     return Box(low, high)
 
 
-def _draft(text: str, case: Case) -> _Draft:
+def _drafts(text: str, case: Case) -> list[_Draft]:
+    """Return the goal of a text; of an axle, those of both wheels if it names none."""
     read = _GOAL.fullmatch(text)
     if read is None:
         raise KincheckError(
@@ -193,7 +208,9 @@ def _draft(text: str, case: Case) -> _Draft:
             ' "toe = 0 +- 0.05 deg", or a file of a curve in place of the value'
         )
     names = [each.name for each in case.outputs if not each.forces]
-    if read["output"] not in names:
+    sides = [f"{side}_{read['output']}" for side in ("left", "right")]
+    outputs = sides if {*sides} <= {*names} else [read["output"]]
+    if outputs[0] not in names:
         raise KincheckError(f"goal {text!r}: {unknown('output', read['output'], names)}")
     number = _NUMBER.fullmatch(read["tolerance"])
     if number is None or not 0.0 < float(number[1]) < np.inf:
@@ -201,12 +218,13 @@ def _draft(text: str, case: Case) -> _Draft:
             f"goal {text!r}: found the tolerance {read['tolerance']!r}, expected a positive number"
             " with a unit; say +- 0.05 deg"
         )
-    unit = _unit(text, number[2], case, read["output"])
+    unit = _unit(text, number[2], case, outputs[0])
     try:
         travel = driver_value(read["at"], case)
     except KincheckError as error:
         raise KincheckError(f"goal {text!r}: {str(error).removeprefix('--at: ')}") from None
-    return _Draft(text, read["output"], travel, read["value"], unit, unit.size * float(number[1]))
+    tolerance = unit.size * float(number[1])
+    return [_Draft(text, each, travel, read["value"], unit, tolerance) for each in outputs]
 
 
 def _unit(text: str, name: str, case: Case, output: str) -> Unit:
@@ -221,6 +239,14 @@ def _unit(text: str, name: str, case: Case, output: str) -> Unit:
     )
 
 
+def travel_of(case: Case) -> tuple[str, Unit]:
+    """Return the name of the travel, and its unit in the table."""
+    driver = case.sweep.driver
+    if driver == TIME:
+        return TIME, SECOND
+    return driver, unit_in_table("rad" if case.mechanism.driver(driver).turns else "m", case)
+
+
 def unit_in_table(si: str, case: Case) -> Unit:
     """Return the unit of an output as the table has it."""
     found = read_unit(_of_table(si, case))
@@ -228,9 +254,10 @@ def unit_in_table(si: str, case: Case) -> Unit:
 
 
 def _of_table(si: str, case: Case) -> str:
-    """Return an SI unit in the units of the table; rates of change are per metre."""
+    """Return an SI unit in the units of the table; rates of change are per metre and per kN."""
     first, *per = si.split("/")
-    return "/".join([{"m": case.length_unit, "rad": case.angle_unit}.get(first, first), *per])
+    first = {"m": case.length_unit, "rad": case.angle_unit}.get(first, first)
+    return "/".join([first, *("kN" if each == "N" else each for each in per)])
 
 
 def _curve(goal: _Draft, case: Case, supplied: WheelOptions) -> tuple[Array, list[str]]:

@@ -42,17 +42,23 @@ class LeastMove:
 
     Attributes:
         moves: over their boxes, shape (moves,).
-        excess: by how much the worst number is beyond its band, over the half-width; not positive
-            if all bands are held.
+        numbers: how far each is from the middle of its band, over the half-width.
         multipliers: by how much the norm falls, if each band becomes wider by its half-width, shape
-            (numbers,); of bands beyond reach, the share of each.
+            (numbers,).
         rounds: of linearisation.
     """
 
     moves: Array
-    excess: float
+    numbers: Array
     multipliers: Array
     rounds: int
+
+    @property
+    def excess(self) -> float:
+        """How far the worst number is beyond its band, over the half-width; not positive if all
+        bands are held.
+        """
+        return float(self.numbers.max()) - 1.0
 
     @property
     def norm(self) -> float:
@@ -98,13 +104,9 @@ def least_move(bands: Bands, start: Array, low: Array, high: Array) -> LeastMove
         if gained > 0.1 and trial is not None:
             u, (g, slopes) = new, trial
         trust = min(2.0, 2.0 * trust) if gained > 0.75 else trust if gained > 0.25 else trust / 4.0
-    excess = float(np.abs(g).max()) - 1.0
     norm = float(np.linalg.norm(u))
     worth = multipliers / norm if norm > 0.0 else np.zeros(len(g))
-    if excess > HELD:
-        beyond = np.where(np.abs(g) - 1.0 >= excess * (1.0 - 1e-3), 1.0, 0.0)
-        worth = beyond / beyond.sum()
-    return LeastMove(u, excess, worth, rounds)
+    return LeastMove(u, np.abs(g), worth, rounds)
 
 
 def _merit(u: Array, excess: float, weight: float) -> float:

@@ -1,17 +1,18 @@
-"""New tables of hardpoints: their points, their case, and its check by another engine."""
+"""A table of hardpoints with moves of its points: its check by another engine, and its file."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...case.case import Case
-from ...case.units import Unit
 from ...cli.registry import Registry
 from ...cli.shared_options import TOL, OfCase
 from ...errors import KincheckError
-from ...harness.record import Outcome, Results
+from ...harness.record import Outcome
+from ...report.sections import Section
+from ..compare.designs import comparison, designs_of
 from ..hardpoints.options import WheelOptions
 from ..hardpoints.read import case_of_hardpoints
 from ..hardpoints.reader import read_hardpoints
@@ -24,110 +25,110 @@ DIGITS = 12
 """Digits of written coordinates: a thousandth of the accuracy of the bands and more."""
 
 
-def require_new(out: Path | None) -> None:
-    """Refuse an existing file, and one without the suffix of CSV.
+def require_new(out: Path | None, suffix: str = ".csv") -> None:
+    """Refuse an existing file, and one without the suffix.
 
     Raises:
         KincheckError: it is so.
     """
-    if out is not None and (out.exists() or out.suffix.lower() != ".csv"):
-        what = "the file exists and stays" if out.exists() else "is written as CSV"
-        raise KincheckError(f"--out {out}: {what}; give a new name that ends in .csv")
+    if out is not None and (out.exists() or out.suffix.lower() != suffix):
+        what = "the file exists and stays" if out.exists() else "the file is another kind"
+        raise KincheckError(f"--out {out}: {what}; give a new name that ends in {suffix}")
 
 
-def table_of(options: OfCase, registry: Registry) -> tuple[Case, Path]:
-    """Return the case of a table, and its file.
+def table_of(options: OfCase, registry: Registry) -> Case:
+    """Return the case of a table.
 
     Raises:
         KincheckError: the case is no table.
     """
     case = registry.case_of(options)
-    if isinstance(options.case, Case) or not case.hardpoints:
+    if not case.hardpoints:
         raise KincheckError(
             f"{case.name}: is no table of hardpoints; give a table, such as car.csv"
         )
-    return case, Path(options.case)
+    return case
 
 
-def write_new(
-    out: Path,
-    case: Case,
-    file: Path,
-    supplied: WheelOptions,
-    moves: Mapping[str, float],
-    registry: Registry,
-) -> str | None:
-    """Write a table with moves by place [m], and return the engine of its check; None
-    without one.
+@dataclass(frozen=True, eq=False)
+class NewTable:
+    """A table with moves of its points.
 
-    Raises:
-        KincheckError: an engine contradicts the native one, or the file cannot be written.
+    Attributes:
+        points: in the units and axes of the table.
+        old, case: of the table, and with the moves, at the same samples.
     """
-    table = read_hardpoints(file, supplied)
-    points = moved_points(table, moves, unit_of(table, supplied.units))
-    checked, _ = check(case, case_of_points(table, supplied, points, case, file), registry)
-    write_table(table, supplied, points, out, f"--out {out}")
-    return checked
 
+    table: HardpointTable
+    supplied: WheelOptions
+    points: Sequence[tuple[float, float, float]]
+    old: Case
+    case: Case
 
-def moved_points(
-    table: HardpointTable, moves: Mapping[str, float], length: Unit
-) -> list[tuple[float, float, float]]:
-    """Return the points of the table with the moves, in its own units and axes."""
-    found = list[tuple[float, float, float]]()
-    for name, old in table.points.items():
-        x, y, z = (
-            float(f"{value + moves[place] / length.size:.{DIGITS}g}")
-            if (place := f"{name} {axis}") in moves
-            else value
-            for axis, value in zip("xyz", old.position, strict=True)
-        )
-        found.append((x, y, z))
-    return found
+    @classmethod
+    def of(cls, options: OfCase, old: Case, moves: Mapping[str, float]) -> NewTable:
+        """Return the table of a command with moves by place [m].
 
-
-def case_of_points(
-    table: HardpointTable,
-    supplied: WheelOptions,
-    points: Sequence[tuple[float, float, float]],
-    case: Case,
-    file: Path,
-) -> Case:
-    """Return the case of the new table, read as the old one, at the same samples."""
-    rows = {
-        name: Hardpoint(row, table.points[name].where)
-        for name, row in zip(table.points, points, strict=True)
-    }
-    new = case_of_hardpoints(replace(table, points=rows), supplied)
-    return replace(
-        new,
-        name=f"{file.stem} new",
-        sweep=replace(new.sweep, values=case.sweep.values),
-        reference={},
-    )
-
-
-def check(old: Case, new: Case, registry: Registry) -> tuple[str | None, Results]:
-    """Return the engine of the check, and the results of the native one.
-
-    Raises:
-        KincheckError: an engine contradicts the native one.
-    """
-    from ...harness import run as running
-
-    native = registry.engine("native")
-    results = running.run([old, new], [native], tol=TOL)
-    for name in CHECKS:
-        if name not in registry.engines:
-            continue
-        engine = registry.engine(name)
-        if engine.version() is None or engine.unsupported(new) is not None:
-            continue
-        (record,) = running.run([new], [engine], tol=TOL, baseline=native).records
-        if record.outcome is not Outcome.PASS:
-            raise KincheckError(
-                f"{new.name}: {name} does not confirm the new table ({record.outcome}:"
-                f" {record.message}); nothing is written. Run kincheck run on both."
+        Raises:
+            KincheckError: the command has a case, and no table.
+        """
+        if isinstance(options.case, Case):
+            raise KincheckError(f"{old.name}: is a case without a file; give the table's path")
+        supplied = options.supplied
+        table = read_hardpoints(Path(options.case), supplied)
+        size = unit_of(table, supplied.units).size
+        points = list[tuple[float, float, float]]()
+        for name, each in table.points.items():
+            x, y, z = (
+                float(f"{value + moves[place] / size:.{DIGITS}g}")
+                if (place := f"{name} {axis}") in moves
+                else value
+                for axis, value in zip("xyz", each.position, strict=True)
             )
-        return name, results
-    return None, results
+            points.append((x, y, z))
+        rows = zip(table.points.items(), points, strict=True)
+        moved = {name: Hardpoint(row, each.where) for (name, each), row in rows}
+        new = case_of_hardpoints(replace(table, points=moved), supplied)
+        sweep = replace(new.sweep, values=old.sweep.values)
+        new = replace(new, name=f"{old.name} new", sweep=sweep, reference={})
+        return cls(table, supplied, points, old, new)
+
+    def check(self, registry: Registry) -> str | None:
+        """Return the engine that confirms the native one; None without any.
+
+        Raises:
+            KincheckError: the engine contradicts.
+        """
+        from ...harness.run import run
+
+        native, new = registry.engine("native"), self.case
+        for name in CHECKS:
+            if name not in registry.engines:
+                continue
+            engine = registry.engine(name)
+            if engine.version() is None or engine.unsupported(new) is not None:
+                continue
+            (record,) = run([new], [engine], tol=TOL, baseline=native).records
+            if record.outcome is not Outcome.PASS:
+                raise KincheckError(
+                    f"{new.name}: {name} does not confirm the new table ({record.outcome}:"
+                    f" {record.message}); nothing is written. Run kincheck run on both."
+                )
+            return name
+        return None
+
+    def compare(self, registry: Registry) -> Sequence[Section]:
+        """Return old against new, as `kincheck compare` prints it."""
+        from ...harness.run import run
+
+        cases = [self.old, self.case]
+        results = run(cases, [registry.engine("native")], tol=TOL)
+        return comparison(designs_of(results, cases), []).sections
+
+    def write(self, out: Path) -> None:
+        """Write the table to a new file.
+
+        Raises:
+            KincheckError: it cannot be written.
+        """
+        write_table(self.table, self.supplied, self.points, out, f"--out {out}")

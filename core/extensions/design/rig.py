@@ -14,12 +14,14 @@ import numpy as np
 from ...case.case import PER_TRAVEL, TIME, Case, Output
 from ...case.io.reader_options import CurveOptions
 from ...case.io.reference_curve import with_curve
-from ...case.units import SECOND, Unit
+from ...case.units import Unit
 from ...errors import KincheckError
 from ...trajectory import Array
 from ..sweep.curves import DesignCurves, curves
 from .goals import Goal, unit_in_table
-from .tune import Search
+from .rubber import NULL as ON_RUBBER
+from .rubber import PERCENT, on_rubber, rubber_curves
+from .search import Curves, Search
 
 DEGREE, FEWEST = 6, 9
 """A polynomial of this degree follows what is left of a curve beside that of a near design; with
@@ -52,6 +54,9 @@ class Rig:
         noise: deviation of the numbers of each output [SI].
         sources: of the noise of each output, in words.
         notes: on how the file was read.
+        curves: solves designs.
+        move: unit in which moves are told.
+        null: moves with this part of the largest effect have none, by the round-off of slopes.
     """
 
     file: Path
@@ -63,6 +68,9 @@ class Rig:
     noise: Sequence[Array]
     sources: Sequence[str]
     notes: Sequence[str]
+    curves: Curves
+    move: Unit
+    null: float
 
     @cached_property
     def weights(self) -> Array:
@@ -78,23 +86,6 @@ class Rig:
     def places(self) -> list[tuple[Goal, int]]:
         """Output and sample of each number."""
         return [(goal, int(k)) for goal in self.goals for k in goal.at]
-
-    @property
-    def move(self) -> Unit:
-        """The unit in which moves are told."""
-        return unit_in_table("m", self.case)
-
-    def travel(self, goal: Goal) -> tuple[str, Array, Unit]:
-        """Return name, values and unit of the samples of an output."""
-        sweep = self.case.sweep
-        if sweep.driver == TIME:
-            return TIME, sweep.values, SECOND
-        turns = self.case.mechanism.driver(sweep.driver).turns
-        return sweep.driver, sweep.values, unit_in_table("rad" if turns else "m", self.case)
-
-    def unit(self, goal: Goal) -> Unit:
-        """Return the unit of an output as the table has it."""
-        return self.unit_of(goal.output)
 
     def unit_of(self, output: str) -> Unit:
         """Return the unit of an output by its name, as the table has it."""
@@ -120,7 +111,7 @@ class Rig:
 
     def model(self, boxes: Mapping[str, float]) -> RigModel:
         """Return the numbers of designs less those measured; see `likely`."""
-        return RigModel(self, Search(self.case, self.goals, boxes))
+        return RigModel(self, Search(self.case, self.goals, boxes, curves=self.curves))
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +164,7 @@ class RigModel:
             size = np.linalg.norm(rows, axis=1)
             known = size > ROUND_OFF * np.nanmax(size)  # at design some are zero
             kept.append(rows[known] / size[known, None])
-        return np.concatenate(kept), NULL
+        return np.concatenate(kept), self.rig.null
 
     def predicted(self, u: Array) -> Iterator[tuple[str, Array, Array]]:
         """Yield the outputs without a column: name, values, and slopes by the moves over
@@ -183,18 +174,20 @@ class RigModel:
         others = [
             each.name
             for each in case.outputs
-            if not (each.forces or isinstance(each, Output))
+            if not (each.forces or type(each) is Output)
             and PER_TRAVEL not in each.name
             and each.name not in names
         ]
         if others:
-            found = curves(case, self.search.places, (u * self.search.box)[None], others, others)
+            found = self.rig.curves(
+                case, self.search.places, (u * self.search.box)[None], others, others
+            )
             for name, values in found.values.items():
                 yield name, values[0], found.slopes[name][0] * self.search.box
 
     def _curves(self, case: Case, u: Array, slopes: Sequence[str]) -> DesignCurves:
         search = self.search
-        return curves(case, search.places, (u * search.box)[None], search.names, slopes)
+        return self.rig.curves(case, search.places, (u * search.box)[None], search.names, slopes)
 
 
 def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
@@ -203,6 +196,8 @@ def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
     Raises:
         CaseError: the file cannot be read, or has no output of the case.
     """
+    soft = bool(case.mechanism.bushings)
+    case = on_rubber(case) if soft else case
     known = {each.name: each.why for each in case.outputs}
     found, notes = with_curve(case, file, replace(options, own_samples=True))
     goals, noise, sources = list[Goal](), list[Array](), list[str]()
@@ -211,10 +206,9 @@ def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
         if series is None or each.forces:
             continue
         at = np.flatnonzero(np.isfinite(series.position))
-        unit = unit_in_table(each.unit, case)
         digits = EVEN * series.uncertainty.get("position", np.zeros(len(series.position)))[at]
         stated = each.atol if each.why != known[each.name] else 0.0
-        named = each.name, each.name, (unit.name, unit.size)
+        named = each.name, each.name, unit_in_table(each.unit, case)
         goals.append(Goal(*named, at, series.position[at], 1.0))
         noise.append(np.hypot(digits, stated))
         sources.append("as stated" if stated else "printed digits")
@@ -225,10 +219,12 @@ def read_rig(case: Case, file: Path, options: CurveOptions) -> Rig:
     def over(values: Array) -> Case:
         return replace(found, sweep=replace(sweep, values=values), reference={})
 
+    solved = rubber_curves, PERCENT, ON_RUBBER
     return Rig(
         *(file, over(at), over(np.concatenate([at + STEP, at - STEP]))),
-        *(over(2.0 * sweep.design - at), over(sweep.design + long)),
+        *(over(2.0 * sweep.design - at), over(at if soft else sweep.design + long)),
         *(goals, noise, sources, notes),
+        *(solved if soft else (curves, unit_in_table("m", case), NULL)),
     )
 
 
@@ -244,7 +240,7 @@ def with_scatter(rig: Rig, drawn: Mapping[str, Array]) -> Rig:
     """
     noise, sources = [*rig.noise], [*rig.sources]
     for k, goal in enumerate(rig.goals):
-        travel = rig.travel(goal)[1][goal.at]
+        travel = rig.case.sweep.values[goal.at]
         count = len({*travel.tolist()})
         if sources[k] != "as stated" and count >= FEWEST:
             off, degree = goal.middle - drawn[goal.output][goal.at], min(DEGREE, count // 3)
@@ -255,9 +251,8 @@ def with_scatter(rig: Rig, drawn: Mapping[str, Array]) -> Rig:
             if scatter > SCATTER * float(np.median(noise[k])):
                 noise[k], sources[k] = np.hypot(noise[k], scatter), "scatter of its samples"
         if not noise[k].all():
-            unit = rig.unit(goal)
             raise KincheckError(
                 f"{rig.file}: {goal.output} has all digits, so its noise is not known; state it:"
-                f' --accuracy "{goal.output}=0.01 {unit.name}"'
+                f' --accuracy "{goal.output}=0.01 {goal.unit.name}"'
             )
     return replace(rig, noise=noise, sources=sources)

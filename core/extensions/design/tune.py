@@ -1,53 +1,61 @@
-"""The search of `kincheck tune`: its curves, its bands, its starts, and the check of its answer."""
+"""The search of `kincheck tune`: its bands, its starts, and what they found."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import combinations
 
 import numpy as np
 
 from ...case.case import Case
-from ...case.units import Unit
-from ...cli.registry import Registry
-from ...errors import KincheckError
 from ...report.axis import number
-from ...report.sections import Report
 from ...trajectory import Array
-from ..compare.designs import comparison, designs_of
-from ..hardpoints.options import WheelOptions
-from ..hardpoints.reader import read_hardpoints
-from ..hardpoints.table import HardpointTable, unit_of
-from ..sweep.curves import curves
-from .goals import Box, Goal, read_goals, read_moves
+from .goals import Box, Goal, travel_of
 from .least_move import HELD, LeastMove, least_move
-from .new_table import case_of_points, check, moved_points
+from .search import Clear, Search
 
 TIGHT = 1e-5
 """A sample this close to an edge of its band, over the half-width, is tight."""
-SAME_NORM = 1e-6
+SAME_NORM, SAME_EXCESS = 1e-6, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """A goal before and after [SI].
+    """A goal before and after.
 
     Attributes:
-        before, after: smallest and largest value at its samples.
-        excess: beyond the band, over its half-width; not positive if it is held.
-        tight: driver values at which it is tight.
-        worst: driver value nearest to an edge, or farthest beyond.
-        multiplier: by how much the norm falls, for each unit by which the band becomes wider.
+        travel: driver values of all samples, shape (n,).
+        before, after: values there [SI], shape (n,).
+        multiplier: by how much the norm falls, for each unit by which the band becomes wider [SI].
     """
 
     goal: Goal
-    before: tuple[float, float]
-    after: tuple[float, float]
-    excess: float
-    tight: list[float]
-    worst: float
+    travel: Array
+    before: Array
+    after: Array
     multiplier: float
+
+    @property
+    def at(self) -> Array:
+        """Driver values at the samples of the goal."""
+        return self.travel[self.goal.at]
+
+    @property
+    def beyond(self) -> Array:
+        """Distance beyond the band over its half-width at these; not positive within it."""
+        return np.abs(self.after[self.goal.at] - self.goal.middle) / self.goal.tolerance - 1.0
+
+    @property
+    def ranges(self) -> list[tuple[float, float]]:
+        """Smallest and largest value at these, before and after."""
+        both = (each[self.goal.at] for each in (self.before, self.after))
+        return [(float(each.min()), float(each.max())) for each in both]
+
+    @property
+    def excess(self) -> float:
+        """The largest distance beyond the band, over its half-width."""
+        return float(self.beyond.max())
 
     @property
     def held(self) -> bool:
@@ -55,19 +63,9 @@ class Band:
         return self.excess <= HELD
 
     @property
-    def unit(self) -> str:
-        """The unit of the goal."""
-        return self.goal.unit[0]
-
-    @property
-    def size_of_unit(self) -> float:
-        """The size of the unit [SI]."""
-        return self.goal.unit[1]
-
-    @property
-    def size(self) -> float:
-        """The half-width in the unit of the goal."""
-        return self.goal.tolerance / self.goal.unit[1]
+    def tight(self) -> list[float]:
+        """Driver values at which it is tight."""
+        return self.at[self.beyond >= -TIGHT].tolist()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,12 +74,12 @@ class Tuned:
 
     Attributes:
         moves, boxes: by place, moves in m, along the axes of the table.
+        forbidding: texts of the goals and boxes that the nearest miss exceeds most; empty if all
+            bands are held.
+        proved: whether nothing can hold all bands, since two of them have no value in common.
         rounds: of linearisation, over all starts; designs: number of those solved.
         ends: the norm at the end of each start, None for one beyond the target.
-        checked: the engine of the check; None without one.
-        table, points: the table as read, and its new points in its own units.
-        comparison: old against new; None if the target is not reached.
-        length: unit of the table.
+        notes: on the files of the goals.
     """
 
     case: Case
@@ -89,15 +87,12 @@ class Tuned:
     moves: Mapping[str, float]
     boxes: Mapping[str, Box]
     bands: Sequence[Band]
+    forbidding: Sequence[str]
+    proved: bool
     rounds: int
     designs: int
     ends: Sequence[float | None]
-    checked: str | None
-    notes: Sequence[str]
-    table: HardpointTable
-    points: Sequence[tuple[float, float, float]]
-    comparison: Report | None
-    length: Unit
+    notes: Sequence[str] = ()
 
     def __repr__(self) -> str:
         how = "reached" if self.reached else "not reached"
@@ -109,6 +104,11 @@ class Tuned:
         return self.move.held
 
     @property
+    def search(self) -> str:
+        """What the answer rests on."""
+        return "proved" if self.proved else "local"
+
+    @property
     def same_ends(self) -> int:
         """The number of starts with the same end."""
         if not self.reached:
@@ -116,77 +116,32 @@ class Tuned:
         near = self.move.norm + SAME_NORM * max(1.0, self.move.norm)
         return sum(each is not None and each <= near for each in self.ends)
 
-    def at(self, value: float) -> str:
+    def text_at(self, value: float) -> str:
         """Return a driver value as text, in the unit of the table."""
-        turns = self.case.mechanism.driver(self.case.sweep.driver).turns
-        size, unit = (np.pi / 180.0, "deg") if turns else (self.length.size, self.length.name)
-        return f"{number(value / size)} {unit}"
-
-
-class Search:
-    """The outputs of a case over their bands, by the moves over their boxes."""
-
-    def __init__(self, case: Case, goals: Sequence[Goal], boxes: Mapping[str, float]) -> None:
-        self.case, self.goals, self.boxes = case, goals, boxes
-        self.places = [*boxes]
-        self.box = np.array([*boxes.values()])
-        self.names = [*dict.fromkeys(each.output for each in goals)]
-        self.designs = 0
-
-    def __call__(self, u: Array) -> tuple[Array, Array] | None:
-        """Return numbers and slopes as `least_move` asks for them."""
-        self.designs += 1
-        found = curves(self.case, self.places, (u * self.box)[None], self.names, self.names)
-        g = np.concatenate(
-            [(found.values[x.output][0, x.at] - x.middle) / x.tolerance for x in self.goals]
-        )
-        by = [found.slopes[x.output][0, x.at] * self.box / x.tolerance for x in self.goals]
-        slopes = np.concatenate(by)
-        usable = found.solved.all() and np.isfinite(g).all() and np.isfinite(slopes).all()
-        return (g, slopes) if usable else None
-
-    def values(self, u: Array, remedy: str = "give a smaller --travel") -> dict[str, Array]:
-        """Return the outputs of a design, shape (n,) each.
-
-        Raises:
-            KincheckError: a sample is not reached, or a goal's output has no value there.
-        """
-        found = curves(self.case, self.places, (u * self.box)[None], self.names)
-        if not found.solved.all():
-            raise KincheckError(
-                f"{self.case.name}: the table does not reach its whole travel"
-                f" ({found.messages.get(0, 'no reason given')}); {remedy}"
-            )
-        for each in self.goals:
-            if not np.isfinite(found.values[each.output][0, each.at]).all():
-                reason = found.reasons.get(each.output, "it is not defined there")
-                raise KincheckError(f"goal {each.text!r}: has no value at a sample: {reason}")
-        return {name: values[0] for name, values in found.values.items()}
+        unit = travel_of(self.case)[1]
+        return f"{number(value / unit.size)} {unit.name}"
 
 
 def tune(
     case: Case,
-    file: Path,
-    supplied: WheelOptions,
-    wanted: tuple[Sequence[str], Sequence[str]],
+    goals: Sequence[Goal],
+    boxes: Mapping[str, Box],
     starts: int,
-    registry: Registry,
+    clear: Sequence[Clear] = (),
+    notes: Sequence[str] = (),
 ) -> Tuned:
     """Return the least move to hold all bands, or the nearest miss.
 
     Args:
-        file: the table of the case, read with `supplied`.
-        wanted: texts of the goals, and of the moves.
+        case: with the samples of the goals.
+        boxes: by place to move.
         starts: number of starts of the search.
+        clear: boxes that no point of the table may be in.
 
     Raises:
-        KincheckError: a goal or move makes no sense, the table does not reach its travel, or
-            another engine contradicts the answer.
+        KincheckError: the table does not reach its travel, or a goal has no value there.
     """
-    of_goals, of_moves = wanted
-    case, goals, notes = read_goals(of_goals, case, supplied)
-    boxes = read_moves(of_moves, case)
-    search = Search(case, goals, {place: each.size for place, each in boxes.items()})
+    search = Search(case, goals, {place: each.size for place, each in boxes.items()}, clear)
     low = np.array([each.low for each in boxes.values()]) / search.box
     high = np.array([each.high for each in boxes.values()]) / search.box
     before = search.values(np.zeros(len(boxes)))
@@ -198,47 +153,31 @@ def tune(
         if (end := least_move(search, start, low, high)) is not None
     ]
     best = min(found, key=lambda each: each.order)
-
-    table = read_hardpoints(file, supplied)
-    length = unit_of(table, supplied.units)
-    moves = dict(zip(boxes, (best.moves * search.box).tolist(), strict=True))
-    points = moved_points(table, moves, length)
     after = search.values(best.moves)
+    worth = np.split(best.multipliers, np.cumsum([len(each.at) for each in goals]))
     bands = [
-        _band(case, goal, before, after, worth)
-        for goal, worth in zip(goals, _by_goal(goals, best.multipliers), strict=True)
+        Band(
+            *(goal, case.sweep.values, before[goal.output], after[goal.output]),
+            float(own.sum()) / goal.tolerance,
+        )
+        for goal, own in zip(goals, worth, strict=False)
     ]
-    checked, report = None, None
-    if best.held:
-        new = case_of_points(table, supplied, points, case, file)
-        checked, results = check(case, new, registry)
-        notes += [] if checked else ["no other engine is installed that can check the new table"]
-        report = comparison(designs_of(results, [case, new]), [])
+    worst = best.numbers >= (1.0 + best.excess) * (1.0 - SAME_EXCESS)
+    pairs = combinations(goals, 2)
     return Tuned(
-        *(case, best, moves, boxes, bands),
+        *(case, best),
+        dict(zip(boxes, (best.moves * search.box).tolist(), strict=True)),
+        *(boxes, bands),
+        [*dict.fromkeys(np.array(search.parts)[worst].tolist())] if not best.held else [],
+        not best.held and any(_disjoint(*pair) for pair in pairs),
         *(sum(each.rounds for each in found), search.designs),
         [each.norm if each.held else None for each in found],
-        *(checked, notes, table, points, report, length),
+        notes,
     )
 
 
-def _by_goal(goals: Sequence[Goal], multipliers: Array) -> list[float]:
-    ends = np.cumsum([len(each.at) for each in goals])[:-1]
-    return [float(each.sum()) for each in np.split(multipliers, ends)]
-
-
-def _band(
-    case: Case, goal: Goal, before: Mapping[str, Array], after: Mapping[str, Array], worth: float
-) -> Band:
-    old, new = (each[goal.output][goal.at] for each in (before, after))
-    off = np.abs(new - goal.middle) / goal.tolerance - 1.0
-    values = case.sweep.values[goal.at]
-    return Band(
-        goal,
-        (float(old.min()), float(old.max())),
-        (float(new.min()), float(new.max())),
-        float(off.max()),
-        values[off >= -TIGHT].tolist(),
-        float(values[off.argmax()]),
-        worth / goal.tolerance,
-    )
+def _disjoint(one: Goal, other: Goal) -> bool:
+    """Return whether two bands of an output have no value in common at a sample."""
+    _, mine, its = np.intersect1d(one.at, other.at, return_indices=True)
+    apart = np.abs(one.middle[mine] - other.middle[its]) > one.tolerance + other.tolerance
+    return one.output == other.output and bool(apart.any())

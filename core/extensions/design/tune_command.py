@@ -41,6 +41,12 @@ class Tune(OfCase):
         several="repeated",
         required=True,
     )
+    keep_clear: tuple[str, ...] = option(
+        "box of another part that no point may be in, over the whole travel, along the axes of the"
+        ' table: "damper: -30:30 380:470 90:300 mm"; may be repeated',
+        metavar="BOX",
+        several="repeated",
+    )
     starts: int = option(
         "number of starts of the search: the table, and random designs of the box; default"
         " %(default)s",
@@ -49,49 +55,60 @@ class Tune(OfCase):
         default=STARTS,
     )
     out: Path | None = destination("write the new table, as CSV", Path)
+    page: Path | None = destination("write a page with curves, bands and moves", Path)
     json: str | None = json_file("the answer")
 
     def answer(self, registry: Registry) -> Tuned:
         """Find the least change of a table of hardpoints to bring outputs into bands.
 
         Raises:
-            KincheckError: a goal or move makes no sense, the table does not reach its travel, or
-                another engine contradicts the answer.
+            KincheckError: a goal or move makes no sense, or the table does not reach its travel.
         """
+        from .goals import points_of, read_goals, read_moves
         from .new_table import table_of
+        from .search import read_clear
         from .tune import tune
 
-        case, file = table_of(self, registry)
-        return tune(case, file, self.supplied, (self.goal, self.move), self.starts, registry)
+        case = table_of(self, registry)
+        case, goals, notes = read_goals(self.goal, case, self.supplied)
+        clear = read_clear(self.keep_clear, case)
+        return tune(case, goals, read_moves(self.move, points_of(case)), self.starts, clear, notes)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
+        from ...case.io.atomic_files import write
         from ...report.sections import print_report
         from ...report.terminal import with_json
-        from ..hardpoints.saving import write_table
-        from .new_table import require_new
+        from . import pages
+        from .new_table import NewTable, require_new
+        from .tune_views import report
 
         require_new(self.out)
         refuse(self.unwritable())
         found = self.answer(registry)
-        if found.reached and self.out is not None:
-            write_table(found.table, self.supplied, found.points, self.out, f"--out {self.out}")
-        with with_json(_facts(found, self.out), self.json) as console:
-            print(*_lines(found), sep="\n", file=console.file)
-            if found.comparison is not None:
-                print_report(found.comparison, cast(TextIO, console.file))
-            if found.reached and self.out is not None:
-                print(f"\n{self.out}: written", file=console.file)
+        out, checked, others = None, None, ()
+        if found.reached:
+            new = NewTable.of(self, found.case, found.moves)
+            checked, others, out = new.check(registry), new.compare(registry), self.out
+            if out is not None:
+                new.write(out)
+        told = report(found, checked, others)
+        if self.page is not None:
+            write("--page", self.page, pages.page(told, found.case, found.moves).encode())
+        with with_json(_facts(found, checked, out), self.json) as console:
+            print_report(told, cast(TextIO, console.file))
+            if out is not None:
+                print(f"\n{out}: written", file=console.file)
         return Status.WITHIN if found.reached else Status.DEVIATES
 
 
-def _facts(found: Tuned, out: Path | None) -> dict[str, Any]:
+def _facts(found: Tuned, checked: str | None, out: Path | None) -> dict[str, Any]:
     """Return the answer as plain data [SI]."""
     return {
         "schema": "kincheck-tune/1",
         "case": found.case.name,
         "reached": found.reached,
-        "search": "local",
+        "search": found.search,
         "norm": found.move.norm,
         "moves_m": found.moves,
         "boxes_m": {name: [each.low, each.high] for name, each in found.boxes.items()},
@@ -99,8 +116,8 @@ def _facts(found: Tuned, out: Path | None) -> dict[str, Any]:
             {
                 "goal": each.goal.text,
                 "output": each.goal.output,
-                "before": list(each.before),
-                "after": list(each.after),
+                "before": each.ranges[0],
+                "after": each.ranges[1],
                 "excess": each.excess,
                 "held": each.held,
                 "tight_at": each.tight,
@@ -108,49 +125,10 @@ def _facts(found: Tuned, out: Path | None) -> dict[str, Any]:
             }
             for each in found.bands
         ],
+        "forbidden_by": found.forbidding,
         "rounds": found.rounds,
         "designs": found.designs,
         "starts": found.ends,
-        "checked_by": found.checked,
-        "file": str(out) if out is not None and found.reached else None,
+        "checked_by": checked,
+        "file": str(out) if out is not None else None,
     }
-
-
-def _lines(found: Tuned) -> list[str]:
-    from ...report.axis import number
-
-    norm = f"norm {found.move.norm:.6g}"
-    counts = f"{found.rounds} rounds, {found.designs} designs"
-    agree = f"{found.same_ends} of {len(found.ends)} starts end here; the search is local"
-    head = f"{found.case.name}: reached, {norm}" if found.reached else ""
-    if not found.reached:
-        worst = max(found.bands, key=lambda each: each.excess)
-        head = (
-            f"{found.case.name}: not reached, no table is written. Forbidden by"
-            f" {worst.goal.text!r}: at best {number(worst.excess * worst.size)} {worst.unit}"
-            f" beyond its band at {found.at(worst.worst)}"
-        )
-    lines = [head, f"  {counts}; {agree}", *(f"  note: {each}" for each in found.notes)]
-    for each in found.bands:
-        low, high = (number(x / each.size_of_unit) for x in each.after)
-        was = " to ".join(number(x / each.size_of_unit) for x in each.before)
-        line = f"  {each.goal.text}: {low} to {high} {each.unit}, before {was}"
-        if each.tight and found.reached:
-            places = ", ".join(map(found.at, each.tight))
-            line += f"; tight at {places}"
-            if each.multiplier > 0.0:
-                gain = each.multiplier * each.goal.tolerance * 0.1
-                line += f"; a band wider by 10 % lowers the norm by {gain:.3g}"
-        elif not each.held:
-            line += f"; {number(each.excess * each.size)} {each.unit} beyond"
-        lines.append(line)
-    for name, move in found.moves.items():
-        box = found.boxes[name]
-        gap = min(box.high - move, move - box.low)
-        at_end = ", the end of its box" if gap <= 1e-6 * box.size else ""
-        unit = found.length
-        lines.append(
-            f"  {name}: {move / unit.size:+.4f} {unit.name},"
-            f" box {number(box.low / unit.size)} to {number(box.high / unit.size)}{at_end}"
-        )
-    return lines

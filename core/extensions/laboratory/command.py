@@ -43,6 +43,8 @@ CASES = (STRUT, "stewart_platform")
 """Cases of the full benchmark: a suspension, and a mechanism of thirteen bodies with
 six coupled loops.
 """
+WITHOUT = ("four_bar", "planar_slider_crank", "rssr")
+"""Cases for the time without machine code: whole turns."""
 PARTS = ("work", "loop", "batch", "study", "size", "processes")
 # Rounds that settle a median to a tenth of the distance between the quartiles.
 ROUNDS = 20
@@ -231,6 +233,36 @@ class BenchCurves(Command):
 
 
 @options
+class BenchNumpy(Command):
+    """Measure the motion of cases without machine code, as an installation without extras solves
+    it, by processor time.
+    """
+
+    about = "motions without machine code"
+    case: tuple[str, ...] = option(
+        f"built-in names, patterns, or case files; default: {' '.join(WITHOUT)}",
+        metavar="CASE",
+        several="once",
+        default=WITHOUT,
+    )
+    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    json: str | None = json_file()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ...report.terminal import with_json
+        from .bench.without_machine_code import lines, measure
+
+        problems: dict[str, str] = {}
+        cases = {case.name: case for case in registry.find_cases(self.case, problems)}
+        refuse(problems.values())
+        found = measure(cases, self.rounds)
+        with with_json(found, self.json) as console:
+            print(*lines(found), sep="\n", file=console.file)
+        return Status.WITHIN
+
+
+@options
 class BenchAll(Command):
     """Measure the engines on a few cases, and the formulation. This takes some minutes."""
 
@@ -240,6 +272,7 @@ class BenchAll(Command):
         "formulation": BenchFormulation,
         "compliance": BenchCompliance,
         "curves": BenchCurves,
+        "numpy": BenchNumpy,
     }
     out: Path | None = destination("write bench.json and bench.html there", Path, "DIR")
     json: str | None = json_file()

@@ -49,7 +49,7 @@ class Serve(Command):
     no_browser: bool = switch("print the address, and open no browser", init=False)
     once: bool = switch("end when the page is closed, with status 0", init=False)
     save: Path | None = destination(
-        "write the page of a table to this file instead, with its solver in it: it opens without"
+        "write the page to this file instead, with its solver in it: it opens without"
         " server and Python, and has no engines to check by",
         Path,
         init=False,
@@ -156,17 +156,11 @@ class Serve(Command):
 
     def _write_page(self, live: Live) -> int:
         from .saved import saved_page
-        from .table import LiveTable
 
         served = {"--port": self.port, "--once": self.once, "--measure": self.measure}
         for name, given in (served | {"--vary": self.variation}).items():
             if given:
                 raise KincheckError(f"{name}: a saved page has no server. Leave it out, or --save.")
-        if not isinstance(live, LiveTable):
-            raise KincheckError(
-                f"--save: {live.file} is no table of hardpoints, and only their pages have a solver"
-                " of their own. Give a table, or leave --save out."
-            )
         assert self.save
         require_writable([("--save", self.save)])
         refuse(written(self.save, saved_page(live).encode()))

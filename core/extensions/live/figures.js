@@ -94,7 +94,36 @@ function figures(box, outputs, axis, state) {
       hovermode: `${along} unified`,
       shapes: bands(output),
     };
-    return { output, plotBox, figure: plot(plotBox, { data: traces(output), layout }) };
+    const made = plot(plotBox, { data: traces(output), layout });
+    listenForGoal(plotBox, output.name, made.at);
+    return { output, plotBox, figure: made };
+  }
+  // While goals are picked, a drag across a figure sets the limits of its output.
+  function listenForGoal(plotBox, name, at) {
+    let from = null;
+    const valueOf = (event) => {
+      const { left, top } = plotBox.getBoundingClientRect();
+      return at([event.clientX - left, event.clientY - top])[across];
+    };
+    function take(event) {
+      if (from === null) return;
+      event.stopImmediatePropagation();
+      const ends = [from, valueOf(event)].map((value) => Number(value.toPrecision(3)));
+      state.limits.set(name, ends.sort((a, b) => a - b));
+      state.limited();
+    }
+    const before = (kind, react) => plotBox.addEventListener(kind, react, true);
+    before("pointerdown", (event) => {
+      if (!state.picking || event.button) return;
+      event.stopImmediatePropagation();
+      plotBox.setPointerCapture(event.pointerId);
+      from = valueOf(event);
+    });
+    before("pointermove", take);
+    before("pointerup", (event) => {
+      take(event);
+      from = null;
+    });
   }
   return {
     group(name) {
@@ -117,10 +146,9 @@ function figures(box, outputs, axis, state) {
 
 // The key numbers: outputs at some poses, such as the ends of the travel and design, with their
 // gradients, and limits.
-//   columns: of each pose its word, and the value of an output there; changed: called when a limit
-//   changes.
+//   columns: of each pose its word, and the value of an output there.
 // Returns `show`.
-function keyNumbers(table, outputs, columns, state, changed) {
+function keyNumbers(table, outputs, columns, state) {
   const first = outputs.some(({ group }) => group === "outputs") ? "outputs" : "coordinates";
   const isPose = columns.length === 1;
   const main = outputs.filter(({ group }) => group === first || isPose);
@@ -141,32 +169,34 @@ function keyNumbers(table, outputs, columns, state, changed) {
     const head = Object.assign(cell("th", output.label), { scope: "row" });
     if (output.shown_unit) head.append(smallText(output.shown_unit));
     const cells = columns.map(() => cell("td", "", "number"));
-    const ends = ["low", "high"].map((end, k) => {
+    const inputs = ["low", "high"].map((end, k) => {
       const input = Object.assign(document.createElement("input"), { autocomplete: "off" });
       input.setAttribute("aria-label", `${end} limit of ${output.label} [${output.shown_unit}]`);
-      const given = (state.limits.get(output.name) || [])[k];
-      if (Number.isFinite(given)) input.value = shown(given, ".6g");
       input.addEventListener("change", () => {
         const both = state.limits.get(output.name) || [NaN, NaN];
         both[k] = typed(input.value);
-        if (!Number.isFinite(both[k])) input.value = "";
         state.limits.set(output.name, both);
-        changed();
-        show();
+        state.limited();
       });
+      return input;
+    });
+    const ends = inputs.map((input) => {
       const holder = cell("td", "", "number");
       holder.append(input);
       return holder;
     });
     row.append(head, ...cells, ...ends);
     row.dataset.output = output.name;
-    return { output, cells, row };
+    return { output, cells, inputs, row };
   });
   table.querySelector("tbody").replaceChildren(...rows.map(({ row }) => row));
 
   function show() {
-    for (const { output, cells } of rows) {
+    for (const { output, cells, inputs } of rows) {
       const [low, high] = state.limits.get(output.name) || [];
+      [low, high].forEach((end, k) => {
+        inputs[k].value = Number.isFinite(end) ? shown(end, ".6g") : "";
+      });
       const rate = slope(output);
       columns.forEach(({ valueOf }, k) => {
         const value = valueOf(output.name);

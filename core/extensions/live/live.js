@@ -48,11 +48,15 @@ function remembered(key, text) {
       state.latest += 1;
     },
     ranking: (message) => ranked(message),
+    proposal: (message) => parts.tuning.told(message),
     spread: (message) => spread(message),
     verdict: (message) => verdict(message),
     exported: (message) => exported(message),
     saved: (message) => say(`saved as ${message.name}`),
-    invalid: (message) => trouble(message.message),
+    invalid(message) {
+      trouble(message.message);
+      if (parts.tuning) parts.tuning.refused();
+    },
     changed: (message) => trouble(message.message, "#changed"),
     lost: () => say("connection lost; start kincheck serve again: your numbers stay here"),
   });
@@ -126,6 +130,7 @@ function remembered(key, text) {
         .map(({ label, name }) => new Option(label, name)),
     );
     one("#ranked").onchange = rank;
+    if (opening.tunable) openTuning(METRES[unit]);
     one("#undo").onclick = () => design.undo();
     one("#redo").onclick = () => design.redo();
     one("#reset").onclick = () => design.all(design.start);
@@ -149,6 +154,33 @@ function remembered(key, text) {
     parts.table.show();
     if (!kept()) solve();
   }
+  function openTuning(metres) {
+    let before = null;
+    const ask = (wanted) =>
+      link.tell({ type: "propose", points: parts.design.rows(), ...wanted });
+    function show(proposal) {
+      before = proposal ? state.ghost : before;
+      state.ghost = proposal || before;
+      parts.planes.ghost(state.ghost.drawing);
+      parts.figures.draw(true);
+    }
+    function take(rows) {
+      const old = parts.design.rows().map((row) => row.slice());
+      parts.design.begin();
+      rows.forEach((row, k) => {
+        if (row.some((value, i) => value !== old[k][i])) parts.design.set(k, row);
+      });
+    }
+    const told = { ask, show, take };
+    parts.tuning = tuning(
+      one("#tuning"),
+      one("#points"),
+      { ...opening, metres },
+      parts.design,
+      state,
+      told,
+    );
+  }
   // The numbers before the page was loaded again, if the file is the same; undone by one step.
   const numbers = () => `kincheck ${opening.source} ${JSON.stringify(opening.points)}`;
   function kept() {
@@ -168,7 +200,9 @@ function remembered(key, text) {
       parts.scene.change(drawing, motionOf(drawing));
       say(`${state.answer.solved.length} samples`);
     };
-    parts.sliders = sliders(one("#sliders"), opening.drivers, { moved, sweep, refuse: trouble });
+    const distance = opening.engines.length > 0;
+    const does = { moved, sweep, refuse: trouble, distance };
+    parts.sliders = sliders(one("#sliders"), opening.drivers, does);
     state.asked = performance.now();
     link.ask("solve", { type: "solve", points: [] });
   }
@@ -254,8 +288,12 @@ function remembered(key, text) {
       parts.planes.ghost(message.drawing);
     }
     parts.figures = figures(one("#figures"), outputs, axis, state);
-    const drawAgain = () => parts.figures.draw();
-    parts.numbers = keyNumbers(one("#numbers"), outputs, columns(), state, drawAgain);
+    parts.numbers = keyNumbers(one("#numbers"), outputs, columns(), state);
+    state.limited = () => {
+      parts.figures.draw(true);
+      parts.numbers.show();
+      if (parts.tuning) parts.tuning.goals();
+    };
     parts.figures.group(one("#group").value);
     one("#group").onchange = () => parts.figures.group(one("#group").value);
     document.documentElement.dataset.ready = "";

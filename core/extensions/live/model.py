@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -155,8 +155,7 @@ class LiveModel(LiveFile):
         """
         driver = self._driver_named(asked.driver)
         ends, messages = list[float](), list[str]()
-        for end in (driver.low, driver.high):
-            way = self._way({driver.name: end - driver.design}, np.linspace(0.0, 1.0, REACH))
+        for end, way in zip((driver.low, driver.high), self.ways(driver), strict=True):
             found = self.solver.prepare(self.case.mechanism, way)(TOL)
             share = float(way.times[found.solved].max(initial=0.0))
             ends.append(driver.design + share * (end - driver.design))
@@ -164,6 +163,11 @@ class LiveModel(LiveFile):
         return Reached(
             driver=driver.name, low=ends[0], high=ends[1], messages=(messages[0], messages[1])
         )
+
+    def ways(self, driver: LiveDriver) -> Iterator[Way]:
+        """Yield the paths from the design to the ends of a slider."""
+        for end in (driver.low, driver.high):
+            yield self._way({driver.name: end - driver.design}, np.linspace(0.0, 1.0, REACH))
 
     def _way(self, changes: Mapping[str, float], shares: Array, slow: float = 1.0) -> Way:
         """Return the path on which all drivers go to their values in a second, or so many times

@@ -115,13 +115,28 @@ class Save(_Message, frozen=True):
     name: Name
 
 
+class Propose(_Message, frozen=True):
+    """Find the least moves of points that bring outputs into bands over the whole travel.
+
+    Attributes:
+        bands: ends by output [SI].
+        boxes: largest move by row of the table and axis, "tierod_inner y" [m].
+    """
+
+    points: Rows
+    bands: Annotated[dict[Name, tuple[Number, Number]], msgspec.Meta(max_length=100)]
+    boxes: Annotated[dict[Name, Number], msgspec.Meta(max_length=100)]
+
+
 class Measured(_Message, frozen=True):
     """Tell how long edits took from the page's event to the drawn curves [ms]."""
 
     milliseconds: Annotated[list[Number], msgspec.Meta(min_length=1, max_length=10_000)]
 
 
-Asked: TypeAlias = Solve | Read | Rank | Vary | Move | Reach | Check | Export | Save | Measured
+Asked: TypeAlias = (
+    Solve | Read | Rank | Vary | Move | Reach | Check | Export | Save | Propose | Measured
+)
 
 
 class LivePoint(msgspec.Struct, frozen=True):
@@ -189,6 +204,7 @@ class Opening(_Message, frozen=True, kw_only=True):
         reference: values to compare with, by output.
         limits: smallest and largest value by output; null without one.
         varied: whether there is a file of tolerances.
+        tunable: whether proposals can be asked for.
     """
 
     protocol: int = VERSION
@@ -206,6 +222,7 @@ class Opening(_Message, frozen=True, kw_only=True):
     reference: dict[str, LiveReference]
     limits: Mapping[str, tuple[float | None, float | None]] = {}
     varied: bool = False
+    tunable: bool = False
 
 
 class Answer(_Message, frozen=True):
@@ -225,6 +242,20 @@ class Answer(_Message, frozen=True):
     frames: list[int]
     message: str
     milliseconds: dict[str, float]
+
+
+class Proposal(_Message, frozen=True):
+    """Other points, and what they give.
+
+    Attributes:
+        message: whether they bring the outputs into their bands, and the largest move.
+        outputs, drawing: as of an answer.
+    """
+
+    points: list[tuple[float, float, float]]
+    message: str
+    outputs: Mapping[str, Values]
+    drawing: dict[str, Any]
 
 
 class Pose(_Message, frozen=True):
@@ -361,6 +392,7 @@ Told: TypeAlias = (
     | Refused
     | Ranking
     | Spread
+    | Proposal
     | Verdict
     | Saved
     | Exported

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias, cast
 
 import msgspec
 import numpy as np
 
-from ...case.case import Case, without_forces
+from ...case.case import HELD_BUT, SLOW, TIME, Case, Sweep, without_forces
+from ...case.measures import JointForce
 from ...errors import KincheckError
 from ...harness.labels import in_table_units
+from ...harness.native_engine import NativeEngine
 from ...harness.provenance import case_facts
+from ...harness.run import run
 from ...kinematics import places
+from ...mechanism.motions import Ramp
 from ...report.axis import DRIVER_UNITS
+from ...report.progress import complain
+from ...studies.reactions import with_reactions
 from ...unit_text import with_unit
 from ..code.js import source
-from ..code.solved import SolvedCase, solved_case
+from ..code.solved import TOL, SolvedCase, loose_forces, solved_case
 from ..hardpoints.saving import new_text
 from ..hardpoints.table import unit_of
-from .protocol import Solve
-from .server import page_files, page_script
+from .model import LiveModel
+from .protocol import Reach, Solve
+from .server import Live, file_of, page_files, page_script
 from .table import LiveTable, drawn, geometry_of, live_outputs, structure_of
 
 POLICY = (
@@ -40,13 +48,40 @@ COLUMNS = "name,x,y,z\n"
 Leaf: TypeAlias = tuple[str | int, ...]
 
 
-def saved_page(live: LiveTable) -> str:
-    """Return the page of a table, with its solver.
+def saved_page(live: Live) -> str:
+    """Return the page of a file, with its solver.
 
     Raises:
-        KincheckError: the case has a part that code cannot have, or does not follow the table
-            linearly.
+        KincheckError: the case has a part that code cannot have, does not follow its table
+            linearly, or does not close.
     """
+    if isinstance(live, LiveTable):
+        (saved, solved), answerer = _table(live), "solver.js"
+    else:
+        (saved, solved), answerer = _model(live), "mover.js"
+    known = msgspec.json.encode(saved).decode()
+    scripts = [
+        f"const SAVED = {known};",
+        f"const solver = (() => {{\n{source(solved)}\n{SOLVER}\n}})();",
+        page_script(answerer),
+    ]
+    # no text in a script may end it
+    script = "\n".join(scripts).replace("</", "<\\/").replace("<!--", "<\\!--")
+    page, style = (page_files()[name][0] for name in ("/", "/live.css"))
+    policy = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+    parts = {
+        '<link rel="stylesheet" href="/live.css">': f"{policy}\n<style>\n{style}</style>",
+        '<script src="/live.js" defer></script>\n': "",
+        "</body>": f"<script>\n{script}\n</script>\n</body>",
+    }
+    for old, new in parts.items():
+        assert page.count(old) == 1, old
+        page = page.replace(old, new)
+    return page
+
+
+def _table(live: LiveTable) -> tuple[dict[str, Any], SolvedCase]:
+    """Return what a page of a table knows, and its solver."""
     case = without_forces(live.case)
     rows = [each.name for each in case.hardpoints if each.moves]
     coordinates = [(live.names.index(name), axis) for name in rows for axis in range(3)]
@@ -66,25 +101,60 @@ def saved_page(live: LiveTable) -> str:
         "head": head,
         **_scene(live, coordinates, solved),
     }
-    known = msgspec.json.encode(saved).decode()
-    scripts = [
-        f"const SAVED = {known};",
-        f"const solver = (() => {{\n{source(solved)}\n{SOLVER}\n}})();",
-        page_script("solver.js"),
-    ]
-    # no text in a script may end it
-    script = "\n".join(scripts).replace("</", "<\\/").replace("<!--", "<\\!--")
-    page, style = (page_files()[name][0] for name in ("/", "/live.css"))
-    policy = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
-    parts = {
-        '<link rel="stylesheet" href="/live.css">': f"{policy}\n<style>\n{style}</style>",
-        '<script src="/live.js" defer></script>\n': "",
-        "</body>": f"<script>\n{script}\n</script>\n</body>",
+    return saved, solved
+
+
+def _model(live: LiveModel) -> tuple[dict[str, Any], SolvedCase]:
+    """Return what a page of a mechanism knows, and the solver that moves its drivers."""
+    answer = live.solve(Solve(points=[]))
+    if not any(answer.solved):
+        raise KincheckError(f"--save: {live.file} has no pose to move from: {answer.message}")
+    case, solved = _steered(live)
+    numbers = {each.quantity.name: k for k, each in enumerate(solved.outputs)}
+    own = {each.name for each in live.case.outputs}
+    reactions = {
+        joint.name: [numbers.get(f"{joint.name}.force_{axis}", -1) for axis in "xyz"]
+        for joint in case.mechanism.given_joints
     }
-    for old, new in parts.items():
-        assert page.count(old) == 1, old
-        page = page.replace(old, new)
-    return page
+    curves = run([live.case], [NativeEngine()], tol=TOL)
+    name = f"{live.file.stem}.csv"
+    saved = {
+        "opening": live.opening(()),
+        "answer": answer,
+        "reaches": [live.reach(Reach(driver=driver)) for driver in live.drivers],
+        "outputs": [(name, k) for name, k in numbers.items() if name in own],
+        "reactions": [each for each in reactions.items() if max(each[1]) >= 0],
+        "poses": [*solved.poses.items()],
+        "slow": SLOW,
+        "csv": {"name": name, "content": file_of(curves, live.case, name)},
+    }
+    return saved, solved
+
+
+def _steered(live: LiveModel) -> tuple[Case, SolvedCase]:
+    """Return the case of a page whose drivers are moved by hand, with its solver; with reactions
+    where code can have them.
+    """
+    moving = {each.name: Ramp(0.0) for each in live.case.mechanism.drivers}
+    sweep = Sweep(TIME, np.array([0.0, 1.0]), motions=moving)
+    motion = tuple(each for each in live.case.outputs if HELD_BUT not in each.facts)
+    case, bodies = replace(live.case, outputs=motion), [*live.bodies]
+    ways = [way for driver in live.drivers.values() for way in live.ways(driver)]
+    if any(each.forces for each in motion) or case.mechanism.has_loads:
+        try:
+            loaded = with_reactions(case, TOL) if case.mechanism.has_loads else case
+            loose, own = loose_forces(loaded), {each.name for each in motion}
+            kept = tuple(
+                each
+                for each in loaded.outputs
+                if each.name not in loose and (each.name in own or isinstance(each, JointForce))
+            )
+            loaded = replace(loaded, outputs=kept, sweep=sweep)
+            return loaded, solved_case(loaded, (), bodies, forces=True, steered=ways)
+        except KincheckError as error:
+            complain([f"the page has no forces: {error}"])
+    case = replace(case, sweep=sweep)
+    return case, solved_case(case, (), bodies, steered=ways)
 
 
 def _columns(case: Case) -> Iterator[dict[str, Any]]:

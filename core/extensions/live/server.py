@@ -13,7 +13,7 @@ import logging
 import re
 import secrets
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -46,6 +46,7 @@ from .protocol import (
     Invalid,
     Measured,
     Move,
+    Propose,
     Rank,
     Reach,
     Read,
@@ -66,7 +67,15 @@ HOST = "127.0.0.1"
 LOCAL = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?", re.IGNORECASE)
 """Names of this machine; any port, for tunnels such as ssh -L."""
 MOST_PAGES = 16
-LIVE_SCRIPTS = ("link.js", "table.js", "planes.js", "figures.js", "sliders.js", "live.js")
+LIVE_SCRIPTS = (
+    "link.js",
+    "table.js",
+    "planes.js",
+    "figures.js",
+    "sliders.js",
+    "tuning.js",
+    "live.js",
+)
 NOTEBOOKS = "http://127.0.0.1:* http://localhost:* vscode-webview:"
 """Pages that may show this one in a frame, if it is for a notebook: those of this machine."""
 HEADERS = {
@@ -285,7 +294,7 @@ class Conversation:
             return
         threads = [
             Thread(target=self._work, args=(kinds, closed), daemon=True)
-            for kinds in ((Solve, Move, Read, Save, Rank, Vary, Reach), (Check, Export))
+            for kinds in ((Solve, Move, Read, Save, Rank, Vary, Reach), (Check, Export, Propose))
         ]
         try:
             with suppress(closed):
@@ -361,7 +370,8 @@ class Conversation:
             if answer is None:
                 kind = type(message).__name__.lower()
                 raise KincheckError(f"a {self.live.kind} has no answer to {kind!r}")
-            with self.server.lock:
+            # edits go on while a proposal is looked for
+            with nullcontext() if isinstance(message, Propose) else self.server.lock:
                 found = answer(message)
                 if isinstance(message, Solve):
                     self.server.points = message.points
@@ -400,10 +410,10 @@ class Conversation:
         if isinstance(message, Export):
             ending = "html" if message.kind == "report" else message.kind
             name = f"{live.file.stem}.{ending}"
-            self.tell(Exported(id=message.id, name=name, content=_file(results, case, name)))
+            self.tell(Exported(id=message.id, name=name, content=file_of(results, case, name)))
 
 
-def _file(results: Results, case: Case, name: str) -> bytes:
+def file_of(results: Results, case: Case, name: str) -> bytes:
     """Return the report or the curves of results."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / name

@@ -5,9 +5,10 @@ const TICKS = 2000;
 
 // The sliders in a box.
 //   moved: called with the values of all drivers, and whether the gesture rests; refuse: with the
-//   message about what is no number; sweep: called to show the sweep of the file.
+//   message about what is no number; sweep: called to show the sweep of the file; distance:
+//   whether poses tell theirs.
 // Returns `show` (a pose) and `reach` (the travel of a driver).
-function sliders(box, drivers, { moved, refuse, sweep }) {
+function sliders(box, drivers, { moved, refuse, sweep, distance: isTold }) {
   const values = Object.fromEntries(drivers.map(({ name, design }) => [name, design]));
   const degrees = 180 / Math.PI;
   const scaleOf = ({ unit }) => (unit === "rad" ? degrees : 1000);
@@ -76,7 +77,8 @@ function sliders(box, drivers, { moved, refuse, sweep }) {
   const last = document.createElement("div");
   last.className = "row";
   const file = button("sweep of the file", sweep);
-  last.append(home, file, "distance from singular poses ", meter, distance);
+  last.append(home, file);
+  if (isTold) last.append("distance from singular poses ", meter, distance);
   box.replaceChildren(...rows.map(({ row }) => row), last);
 
   return {

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ...case.case import PER_TRAVEL, Case, without_forces
 from ...case.designs import DesignOutputs
 from ...case.quantity import Output, Quantity
+from ...doors import offers
 from ...errors import KincheckError, unknown
 from ...harness.labels import output_label
 from ...harness.provenance import case_facts
@@ -45,6 +46,8 @@ from .protocol import (
     LivePoint,
     LiveReference,
     Opening,
+    Proposal,
+    Propose,
     Rank,
     Ranking,
     Read,
@@ -143,6 +146,7 @@ class LiveTable(LiveFile):
             save=free_name(self.file),
             limits={each.output: (each.low, each.high) for each in limits},
             varied=self.variation is not None,
+            tunable=bool(offers("proposals")),
         )
 
     def edited_case(self, points: Rows, *, followed: bool = True) -> Case:
@@ -261,6 +265,29 @@ class LiveTable(LiveFile):
             bins=[each and Bins(each.edges, each.counts) for each in bins],
             variants=count,
             failed=int((~found.solved.all(axis=0)).sum()),
+        )
+
+    def propose(self, asked: Propose) -> Proposal:
+        """Return the points that bring outputs into bands, by an extension that offers it.
+
+        Raises:
+            KincheckError: no extension does, or it finds none.
+        """
+        case, offer = self.edited_case(asked.points), next(iter(offers("proposals").values()), None)
+        if offer is None:
+            raise KincheckError("proposals: the extension that finds them is not installed")
+        moves, message = offer.load()(case, asked.bands, asked.boxes)
+        size = unit_of(self.table, self.supplied.units).size
+        points = list[tuple[float, float, float]]()
+        for name, row in zip(self.names, asked.points, strict=True):
+            x, y, z = (
+                at + moves.get(f"{name} {axis}", 0.0) / size
+                for at, axis in zip(row, "xyz", strict=True)
+            )
+            points.append((x, y, z))
+        found = self.solve(Solve(points=points))
+        return Proposal(
+            points=points, message=message, outputs=found.outputs, drawing=found.drawing
         )
 
     def save(self, asked: Save) -> Saved:

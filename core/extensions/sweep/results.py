@@ -96,7 +96,8 @@ class Gradient(msgspec.Struct, frozen=True, kw_only=True):
         along: values at the samples.
         largest: the value of largest size over the samples, with its sign.
         sample: the sample of `largest`.
-        error: bound of the error, from two step sizes.
+        error: bound of the error: zero of an exact slope; of the difference of a rate or a force,
+            from two step sizes.
         accurate: whether `error` is at most 1e-6 of the output's largest gradient by any coordinate
             of the same unit.
         scale: scale of the coordinate.

@@ -333,22 +333,16 @@ def largest(changes: Array) -> Array:
     return np.take_along_axis(changes, sizes.argmax(axis=1)[:, None, :], axis=1)[:, 0]
 
 
-# Gradients of outputs by the coordinates of a variation at the nominal design. They are central
-# differences of solved variants. A coordinate moves by h and h/2 in both directions. The error of
-# the difference D(h) is f''' h^2 / 6 + f''''' h^4 / 120. Richardson's combination (4 D(h/2) -
-# D(h)) / 3 has an error of order h^4. The error of D(h/2) is |D(h/2) - D(h)| / 3. It bounds the
-# error of the result if the series converges. With h/size = 2e-4 the relative size of the h^2 term
-# is about (h/size)^2 / 6 = 7e-9, of the h^4 term 1e-17. Round-off of 1e-15 of the size in an
-# output is 5e-12 of a gradient of one. So an output may curve a hundred times as strongly as one
-# of the mechanism's size.
-
+# Gradients of the rows by the coordinates of a variation at the nominal design. Outputs of the
+# motion have exact slopes. Rates and forces have central differences D of solved variants, with
+# steps h and h/2: Richardson's (4 D(h/2) - D(h)) / 3, whose error is below |D(h/2) - D(h)| / 3 if
+# the series converges. With h/size = 2e-4 round-off of 1e-15 is 5e-12 of a gradient of one.
 
 STEP = 2e-4
-# Required accuracy: error relative to the output's largest gradient by a coordinate of the
-# same unit.
+# Required accuracy: error relative to the row's largest gradient by a coordinate of the same unit.
 ACCURATE = 1e-6
-# Round-off of the gradient of an output without first-order change: this share of the output's
-# size, or of the mechanism's, divided by the step. It is a thousand times a number's round-off.
+# Round-off of the gradient of a row without first-order change: this share of the row's size, or of
+# the mechanism's, divided by the step. It is a thousand times a number's round-off.
 ROUND_OFF = 1e-13
 MOVES = np.array([1.0, -1.0, 0.5, -0.5])
 
@@ -359,10 +353,10 @@ class Gradients:
 
     Attributes:
         along: over the samples [unit of row / unit of coordinate], shape (coordinates, rows, n);
-            NaN if a neighbour of the nominal design has no value.
+            NaN if the nominal design, or of a difference a neighbour, has no value.
         design: at the design position, shape (coordinates, rows); None if the case does not
             pass through it.
-        error: bound of the error over the samples and at design, from the two steps,
+        error: bound of the error of differences over the samples and at design, zero of slopes,
             shape (coordinates, rows).
         accurate: whether the error is at most `ACCURATE` of the row's largest gradient, or
             round-off, shape (coordinates, rows).
@@ -378,32 +372,35 @@ class Gradients:
 
 def gradients(ready: Ready) -> Gradients:
     """Return the gradients of a study."""
-    study, path = ready.study, ready.study.case.sweep.path
+    study, case, path = ready.study, ready.study.case, ready.study.case.sweep.path
     n, count = len(path.times), len(study.variation.coordinates)
     start = ready.outputs.designs.start
     from_design = start.starts_at_design
     if from_design:  # one sample more, at the design position
-        ready = ready.on_path(Path(path.motions, np.append(path.times, start.time), path.design))
-    steps = np.array([STEP * _size(study, k) for k in range(count)])
+        path = Path(path.motions, np.append(path.times, start.time), path.design)
     found = np.empty((count, len(study.rows), n + from_design))
-    apart = np.empty_like(found)
-    messages = dict[int, str]()
-    at_once = max(1, ready.lanes // len(MOVES))
-    for first in range(0, count, at_once):
-        some = np.arange(first, min(first + at_once, count))
-        offsets = np.zeros((count, len(some), len(MOVES)))
-        offsets[some, np.arange(len(some))] = steps[some, None] * MOVES
-        values, _, _, why = ready.values(offsets.reshape(count, -1))
-        plus, minus, half_plus, half_minus = np.moveaxis(
-            values.reshape(*values.shape[:2], len(some), len(MOVES)), -1, 0
-        )
-        h = steps[some]
-        whole, half = (plus - minus) / (2.0 * h), (half_plus - half_minus) / h
-        found[some] = np.moveaxis((4.0 * half - whole) / 3.0, -1, 0)
-        apart[some] = np.moveaxis(np.abs(half - whole) / 3.0, -1, 0)
-        for lane, message in why.items():
-            messages.setdefault(first + lane // len(MOVES), message)
-    error = np.fmax.reduce(apart, axis=2)
+    exact = np.array([not (each.derivative or each.output.forces) for each in study.rows])
+    if exact.any():
+        motion = tuple(each for each in case.outputs if not each.forces)
+        places, names = study.variation.places, [each.name for each in motion]
+        made = DesignOutputs.of(replace(case, outputs=motion), places, slopes=names)
+        solved = made.on_path(path).solve(study.variation.nominal[:, None], study.tol)
+        slopes = dict(solved.slopes(study.variation.moves))
+        found[:, exact] = np.stack([slopes[name][:, :, 0] for name in names], axis=1)
+    error, messages = np.zeros(found.shape[:2]), dict[int, str]()
+    steps = np.array([STEP * _size(study, k) for k in range(count)])
+    if not exact.all():
+        ready = ready.on_path(path)
+        for k, h in enumerate(steps.tolist()):
+            offsets = np.zeros((count, len(MOVES)))
+            offsets[k] = h * MOVES
+            values, _, _, why = ready.values(offsets)
+            plus, minus, half_plus, half_minus = np.moveaxis(values[~exact], -1, 0)
+            whole, half = (plus - minus) / (2.0 * h), (half_plus - half_minus) / h
+            found[k, ~exact] = (4.0 * half - whole) / 3.0
+            error[k, ~exact] = np.fmax.reduce(np.abs(half - whole), axis=1) / 3.0
+            if why:
+                messages[k] = next(iter(why.values()))
     accurate = error <= np.maximum(ACCURATE * _largest(ready, found), _noise(ready, steps))
     design = found[:, :, n] if from_design else None
     return Gradients(found[:, :, :n], design, error, accurate, messages)

@@ -20,6 +20,7 @@ from ...caches import ThreadCache, cache_last
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import NODES, Side, groups_behind, place_of
+from ...program.numpy_executor import lagrange
 from ...trajectory import Array, Trajectory
 from .compiled_model import CLOSED, RECENT, Model, is_builtin, recent_model
 from .request import Request
@@ -242,19 +243,6 @@ def weights_of_samples(times: Array) -> Array:
     # the last sample that was kept at each place
     nodes = wanted - 1 - (wanted - 1 - np.arange(NODES)[:, None]) % NODES
     found[:, wanted] = lagrange(times[wanted], times[nodes])
-    return found
-
-
-def lagrange(times: Array, nodes: Array) -> Array:
-    """Lagrange's weights for the times, shape (n,), of nodes for each; nodes and weights have shape
-    (nodes, n).
-    """
-    found, ahead = np.empty_like(nodes), times - nodes
-    with np.errstate(all="ignore"):
-        for k, node in enumerate(nodes):  # one after the other: there may be millions of samples
-            factors = ahead / (node - nodes)
-            factors[k] = 1.0
-            found[k] = factors.prod(axis=0)
     return found
 
 

@@ -121,6 +121,7 @@ def welded(tmp_path):
     return case
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ["exudyn", "drake"])
 def test_welded_body_is_stepped(engine, tmp_path):
     pytest.importorskip({"drake": "pydrake"}.get(engine, engine), exc_type=ImportError)

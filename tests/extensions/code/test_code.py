@@ -14,7 +14,7 @@ import pytest
 from kincheck import cases
 from kincheck.core import KincheckError
 from kincheck.core.cli.main import main
-from kincheck.core.extensions.code import c, js
+from kincheck.core.extensions.code import c, fmu, js
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from scipy.interpolate import CubicSpline
 
@@ -22,7 +22,7 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
 CLOSE = 1e-13
 """Largest difference to native, relative to the largest value: a thousand round-offs."""
 SOME = ("mcpherson_strut", "four_bar", "rssr", "five_bar", "delta_robot", "bennett")
-FINER = {"bennett": "the code exchanges rows before native, whose accelerations lose a digit there"}
+FINER = {"bennett": "native's accelerations and torque lose a digit near its singular pose"}
 compiled = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 node = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
 MOTIONS = ("position", "velocity", "acceleration")
@@ -44,8 +44,9 @@ def library(folder, name, *flags, compiler="gcc"):
     command = [compiler, *STRICT, *flags, "-o", str(file), f"{name}.c", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
     found = ctypes.CDLL(str(file))
-    for function in ("output", "parameter"):
-        getattr(found, f"{name}_{function}").restype = ctypes.c_char_p
+    for function in ("output", "parameter", "driver"):
+        if hasattr(found, f"{name}_{function}"):
+            getattr(found, f"{name}_{function}").restype = ctypes.c_char_p
     getattr(found, f"{name}_size").restype = ctypes.c_size_t
     getattr(found, f"{name}_nominal").restype = ctypes.c_double
     number, state = ctypes.c_double, ctypes.c_void_p
@@ -100,9 +101,9 @@ def truth(case, *, forces=False):
     found = native(case, forces=forces)
     if case.name in FINER:
         for j, each in enumerate(each for each in case.outputs if forces or not each.forces):
-            if not each.forces:
-                known = case.reference[each.name]
-                found[:, j] = np.transpose([getattr(known, motion) for motion in MOTIONS])
+            known = case.reference[each.name]
+            for order, motion in enumerate(MOTIONS[: each.orders]):
+                found[:, j, order] = getattr(known, motion)
     return found
 
 
@@ -163,6 +164,36 @@ console.log(JSON.stringify(found));
     found = np.empty((len(rows), rows.shape[1] // 3, 3))
     found[[k for k in way(case) if k is not None]] = rows.reshape(len(rows), -1, 3)
     return found
+
+
+@compiled
+@pytest.mark.parametrize("name", ["five_bar", "mcpherson_steered"])
+def test_drivers_move_to_values_of_their_own(name, tmp_path):
+    """Straight from one value to another that is far, back and forth, then along the sweep."""
+    case = kincheck.load(name)
+    write(tmp_path, c.files(case, ()))
+    call = library(tmp_path, name, "-O1")
+    names = [each.name for each in case.mechanism.drivers]
+    assert [call("driver", k).decode().split()[0] for k in range(call("drivers"))] == names
+    path, expected = case.sweep.path, truth(case)
+    velocities = path.drive(names, path.times)[1]
+    moved = np.array([case.sweep.moved.get(each, 0.0 * path.times) for each in names])
+    count = len(names)
+    state = (ctypes.c_double * (call("size") // 8))()
+    out = (ctypes.c_double * (3 * call("outputs")))()
+    call("start", state)
+    for k in (2, -3, 5, 0, 1):
+        given = [(ctypes.c_double * count)(*each[:, k]) for each in (moved, velocities)]
+        assert call("move_all", state, *given, out) == 0
+        found = np.frombuffer(out).reshape(-1, 3)
+        assert_equal(found[:, :2], expected[k][:, :2])
+    given[0][1] = float("nan")
+    before = bytes(state)
+    assert call("move_all", state, *given, out) == 1
+    assert bytes(state) == before
+    k = next(each for each in way(case) if each is not None)
+    assert call("move", state, float(case.sweep.values[k]), float(case.sweep.rate), out) == 0
+    assert_equal(np.frombuffer(out).reshape(-1, 3), expected[k])
 
 
 @node
@@ -306,6 +337,28 @@ def test_fmu_passes_as_engine(version, tmp_path, monkeypatch, capsys):
     errors = record["errors"]["half_track_change"]
     assert max(errors[motion]["max_abs"] for motion in MOTIONS) < CLOSE
     capsys.readouterr()
+
+
+@compiled
+@pytest.mark.skipif(importlib.util.find_spec("fmpy") is None, reason="no FMPy")
+@pytest.mark.parametrize("version", [pytest.param(2, marks=pytest.mark.nightly), 3])
+def test_fmu_has_drivers_that_hold_as_inputs(version, tmp_path):
+    fmpy, case = importlib.import_module("fmpy"), kincheck.load("five_bar")
+    k, expected = 3, truth(case)
+    held = replace(case, sweep=replace(case.sweep, motions={}), reference={})
+    write(tmp_path, fmu.files(held, ["joints.left_pivot.point x"], version))
+    file = str(tmp_path / "five_bar.fmu")
+    assert importlib.import_module("fmpy.validation").validate_fmu(file) == []
+    given = {name: float(values[k]) for name, values in case.sweep.moved.items()}
+    velocities = case.sweep.path.drive(list(given), case.sweep.path.times)[1][:, k]
+    given |= {f"{name}.velocity": float(v) for name, v in zip(given, velocities, strict=True)}
+    names = [each.name for each in case.outputs]
+    found = fmpy.simulate_fmu(file, start_values=given, stop_time=0.1, output=names)[0]
+    assert_equal(np.array([found[name] for name in names]), expected[k, :, 0])
+    found = fmpy.simulate_fmu(
+        file, start_values=given, stop_time=0.1, output=[f"{each}.velocity" for each in names]
+    )[0]
+    assert_equal(np.array([found[f"{name}.velocity"] for name in names]), expected[k, :, 1])
 
 
 @pytest.mark.parametrize(

@@ -344,6 +344,7 @@ def test_engine_equilibria_equal_data(load_cases, name):
         assert found.forces.drivers["stroke"][0] == pytest.approx(row["wheel_load"], abs=4e-6)
 
 
+@pytest.mark.nightly
 def test_engine_verdicts_on_axle(tmp_path, capsys):
     """Both wheels against each other, with an anti-roll bar."""
     names = ["mujoco", "exudyn-static"]
@@ -398,6 +399,7 @@ def test_engine_without_statics_is_unsupported(tmp_path, capsys):
     assert "finds no equilibria" in capsys.readouterr().out
 
 
+@pytest.mark.nightly
 def test_bench_compliance_times_samples_and_matrices(tmp_path, capsys):
     out = tmp_path / "bench.json"
     command = ["bench", "compliance", strut_file(tmp_path), "--rounds=1", f"--json={out}"]

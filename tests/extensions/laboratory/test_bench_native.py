@@ -12,6 +12,7 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.core import SolveError
 from kincheck.core.case.case import without_forces
+from kincheck.core.cli.main import main
 from kincheck.core.extensions.laboratory.bench import (
     designs,
     precision,
@@ -146,6 +147,15 @@ def test_scaling_rows_have_residual_and_error():
     assert all(row.residual <= 1e-15 for row in rows)
     assert all(row.error <= 1e-14 for row in rows)
     assert all(row.us_per_value.median > 0.0 for row in rows)
+
+
+def test_motion_without_machine_code(capsys):
+    assert main("bench numpy --case rssr --rounds 1 --json -".split()) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["samples"] == {"rssr": 181}
+    assert found["us_per_sample"]["rssr"]["least"] > 0.0
+    assert main("bench numpy --case rssr nosuch".split()) == 2
+    assert "no case 'nosuch'" in capsys.readouterr().err
 
 
 def test_growth_of_largest_sizes():

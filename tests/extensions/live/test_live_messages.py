@@ -16,7 +16,19 @@ from .conftest import TRAVEL, Page, page_of
 COUNT = 400
 NUMBERS = [0, -0.0, 1, -1, 3.5, 1e-300, 1e30, 1e100, -1e100, 1e101, 1e308, 10**30, 2**53, 2**54]
 OTHERS = [None, True, "x", "", "\ud800", "\0", "é" * 99, [], {}, [[]], {"": 0}]
-WORDS = ["solve", "read", "rank", "vary", "move", "reach", "check", "export", "save", "measured"]
+WORDS = [
+    "solve",
+    "read",
+    "rank",
+    "vary",
+    "move",
+    "reach",
+    "check",
+    "export",
+    "save",
+    "measured",
+    "propose",
+]
 
 
 class Maker:
@@ -48,6 +60,7 @@ class Maker:
                 {"type": "export", "kind": "csv", "engines": ["no engine"]},
                 {"type": "save", "points": points, "name": "../other.csv"},
                 {"type": "measured", "milliseconds": [1.0]},
+                {"type": "propose", "points": points, "bands": {output: [1, 0]}, "boxes": {"a": 1}},
             ]
         )
 

@@ -20,11 +20,13 @@ from kincheck import KincheckError, load, run, sweep
 from kincheck import live as kincheck_live
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
+from kincheck.core.extensions.live import table as live_table
 from kincheck.core.extensions.live.model import LiveModel
 from kincheck.core.extensions.live.protocol import (
     LARGEST_MESSAGE,
     MOST_MESSAGES,
     Move,
+    Propose,
     Rank,
     Reach,
     Solve,
@@ -581,3 +583,12 @@ def test_live_edits_compile_nothing(car, tmp_path, monkeypatch, axle):
         points[5][2] += 0.01 * k
         assert all(live.solve(Solve(points=points)).solved)
     assert compiled == []
+
+
+def test_live_page_without_proposals(car, monkeypatch):
+    monkeypatch.setattr(live_table, "offers", lambda kind: {})
+    live = LiveTable(car, TRAVEL)
+    assert not live.opening(()).tunable
+    asked = Propose(points=live.positions, bands={"toe": (-1e-3, 1e-3)}, boxes={"uca_outer z": 1.0})
+    with pytest.raises(KincheckError, match="is not installed"):
+        live.propose(asked)

@@ -11,11 +11,14 @@ import subprocess
 import kincheck
 import numpy as np
 import pytest
+from kincheck import cases
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
-from kincheck.core.extensions.live.protocol import Solve
+from kincheck.core.extensions.live.model import LiveModel
+from kincheck.core.extensions.live.protocol import Move, Solve
 from kincheck.core.extensions.live.saved import saved_page
 from kincheck.core.extensions.live.table import LiveTable
+from kincheck.core.report.curves import write_curves
 
 from ...support.browser import CHROMIUM, Browser
 from .conftest import CAR
@@ -182,10 +185,29 @@ def test_saved_page_saves_table(saved, browser, car):
     assert toes[0] == toes[1]
 
 
+OPEN = {
+    "schema": "kincheck-case/1",
+    "name": "open",
+    "source": "a rod of 9 m between places that are 1 m apart",
+    "bodies": {"crank": {}, "arm": {}},
+    "joints": {
+        "pivot": {"type": "revolute", "bodies": ["ground", "crank"], "point": [0, 0, 0],
+                  "axis": [0, 0, 1]},
+        "elbow": {"type": "revolute", "bodies": ["crank", "arm"], "point": [1, 0, 0],
+                  "axis": [0, 0, 1]},
+        "rod": {"type": "distance", "bodies": ["ground", "arm"],
+                "points": [[2, 1, 0], [2, 0, 0]], "length": 9},
+    },
+    "drivers": {"turn": {"type": "joint_angle", "joint": "pivot"}},
+    "sweep": {"driver": "turn", "start": 0, "stop": 1, "steps": 3},
+    "outputs": {"angle": {"type": "joint_angle", "joint": "elbow"}},
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("argv", "said"),
     [
-        ("four_bar --save p.html", "--save: four_bar is no table of hardpoints"),
+        ("open.json --save p.html", "--save: open.json has no pose to move from"),
         ("car.csv --save p.html --port 8000", "--port: a saved page has no server"),
         ("car.csv --save p.html --once", "--once: a saved page has no server"),
         ("car.csv --save no/p.html", "no/p.html"),
@@ -193,9 +215,37 @@ def test_saved_page_saves_table(saved, browser, car):
 )
 def test_page_is_not_saved(argv, said, car, monkeypatch, capsys):
     monkeypatch.chdir(car.parent)
+    car.with_name("open.json").write_text(json.dumps(OPEN))
     assert main(["serve", *argv.split()]) == 2
     assert said in capsys.readouterr().err
     assert not car.with_name("p.html").exists()
+
+
+@in_browser
+def test_saved_page_moves_drivers(browser, tmp_path, monkeypatch):
+    """By sliders, with the curves as the command writes them."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["serve", "planar_slider_crank", "--save", "page.html"]) == 0
+    page = tmp_path / "page.html"
+    browser.visit(page.as_uri())
+    x, y = browser.middle("#sliders input[type=range]")
+    browser.drag((x, y), (25.0, 0.0))
+    until_state(browser, "all loops closed")
+    browser.until("document.querySelector('#sliders .travel').checkVisibility()")
+    seen = browser.run(
+        "return [all('meter').length, one('#alone').innerText, all('#numbers td')[0].textContent]"
+    )
+    assert seen[:2] == [0, "This page has no engines, so it has no check and no distance from"
+                           " singular poses: kincheck serve with the file has."]  # fmt: skip
+    browser.run(
+        "window.files = []; const made = URL.createObjectURL;"
+        "URL.createObjectURL = (blob) => (files.push(blob), made.call(URL, blob));"
+    )
+    browser.click("[data-export=csv]")
+    browser.until("files.length")
+    found = kincheck.run(kincheck.load("planar_slider_crank"), "native")
+    write_curves(found, tmp_path / "r.csv", kind="csv", long=False)
+    assert browser.run("return files[0].text()") == (tmp_path / "r.csv").read_bytes().decode()
 
 
 ANSWERS = """
@@ -207,14 +257,24 @@ const part = (from, to) => script.slice(script.indexOf(from), script.indexOf(to)
 const parts = [
   part("const SAVED", '"use strict"'), // and the solver
   script.match(/^const direction = .*$/m)[0],
-  part("const MOST_FRAMES", "function linkTo"),
+  part(script.includes("const WAY") ? "const WAY" : "const MOST_FRAMES", "function linkTo"),
 ];
 const link = (0, eval)(`${parts.join("\\n")}; answererOf`);
 const told = [];
 const send = link((message) => told.push(message));
-for (const points of asked) await send({ type: "solve", points, whole: true });
-console.log(JSON.stringify(told.filter(({ type }) => type === "answer")));
+for (const each of asked) await send(each);
+console.log(JSON.stringify(told.filter(({ type }) => type !== "opening")));
 """
+
+
+def answers(page, asked, folder):
+    """Return the answers of a page to messages."""
+    assert len(page.encode()) < LARGEST
+    (folder / "page.html").write_text(page, "utf-8")
+    (folder / "asked.json").write_text(json.dumps(asked))
+    (folder / "ask.mjs").write_text(ANSWERS)
+    said = subprocess.run(["node", "ask.mjs"], cwd=folder, capture_output=True, check=True)
+    return json.loads(said.stdout)
 
 
 def assert_answers_as_server(template, folder, **supplied):
@@ -222,16 +282,11 @@ def assert_answers_as_server(template, folder, **supplied):
     table = folder / "car.csv"
     table.write_text(sample_table(TEMPLATES[template]), "utf-8")
     live = LiveTable(table, kincheck.Supplied(travel="0.02:9", **supplied))
-    page = saved_page(live)
-    assert len(page.encode()) < LARGEST
-    (folder / "page.html").write_text(page, "utf-8")
     rng = np.random.default_rng(1)
     edits = [(np.array(live.positions) + rng.uniform(-2, 2, (len(live.names), 3))).tolist()
              for _ in range(2)]  # fmt: skip
-    (folder / "asked.json").write_text(json.dumps(edits))
-    (folder / "ask.mjs").write_text(ANSWERS)
-    said = subprocess.run(["node", "ask.mjs"], cwd=folder, capture_output=True, check=True)
-    for points, found in zip(edits, json.loads(said.stdout), strict=True):
+    asked = [{"type": "solve", "points": points, "whole": True} for points in edits]
+    for points, found in zip(edits, answers(saved_page(live), asked, folder), strict=True):
         expected = live.solve(Solve(points=[tuple(row) for row in points]))
         assert found["solved"] == expected.solved
         assert found["frames"] == expected.frames
@@ -262,3 +317,39 @@ def test_saved_pages_of_all_templates(template, axle, tmp_path):
     if axle == "steer" and "tierod_inner" not in {each.name for each in TEMPLATES[template].roles}:
         pytest.skip(f"{template} is not steered")
     assert_answers_as_server(template, tmp_path, axle=axle)
+
+
+def assert_moves_as_server(name, folder):
+    """Compare poses at values of the drivers, at rest, with those of the server."""
+    live = LiveModel(folder / name, kincheck.load(name))
+    rng = np.random.default_rng(4)
+    values = [
+        {
+            driver: each.design + share * float(rng.uniform(each.low, each.high) - each.design)
+            for driver, each in live.drivers.items()
+        }
+        for share in (0.0, 0.05, 0.3)
+    ]
+    asked = [{"type": "move", "drivers": each, "measured": True} for each in values]
+    for drivers, found in zip(values, answers(saved_page(live), asked, folder), strict=True):
+        expected = live.move(Move(drivers=drivers, measured=True))
+        assert found["share"] == expected.share
+        assert {*found["outputs"]} == {*expected.outputs}
+        for kind in ("bodies", "outputs", "reactions"):
+            for part, numbers in getattr(expected, kind).items():
+                pair = (np.array(each, dtype=float) for each in (found[kind][part], numbers))
+                np.testing.assert_allclose(*pair, rtol=CLOSE, atol=CLOSE, err_msg=part)
+
+
+@in_node
+@pytest.mark.parametrize("name", ["bennett", "planar_slider_crank"])
+def test_saved_page_moves_as_server(name, tmp_path):
+    """Rows are exchanged on the way of the first; the second has reactions."""
+    assert_moves_as_server(name, tmp_path)
+
+
+@in_node
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", cases.names())
+def test_saved_pages_of_all_cases(name, tmp_path):
+    assert_moves_as_server(name, tmp_path)

@@ -126,6 +126,7 @@ def test_workflow_comments_on_pull_requests(repository, runner):
     assert installed.splitlines()[2] == "-m pip install ."
 
 
+@pytest.mark.nightly
 def test_workflow_keeps_history_in_branch(repository, runner, tmp_path):
     assert init("--history", "branch", "--case", "first.toml", "--no-badge") == 0
     git(tmp_path, "init", "--quiet", "--bare", "origin")

@@ -16,7 +16,7 @@ from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.explain.diagnose import diagnose
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
-from kincheck.core.extensions.sweep.study import Ready, Study, gradients
+from kincheck.core.extensions.sweep.study import Ready, Study
 from kincheck.core.extensions.sweep.variation_file import read_variation
 from kincheck.core.extensions.sweep.varied_places import Geometry
 from kincheck.core.kinematics import placed, solve_designs
@@ -31,6 +31,8 @@ CORNER = Supplied(travel="0.04:3", **CAR)
 CLOSE = 1e-13
 # Round-off of a difference over a step of 2e-4 of a metre, over the largest derivative.
 ACCURATE = 1e-8
+STEP = 2e-4
+"""Step of differences [m or rad]."""
 AXIS = ["wheel_axis", "0.4", "860", "308"]
 """A wheel with toe and camber at design: a point of its axis of rotation [mm]."""
 
@@ -108,19 +110,31 @@ def test_variant_of_row_equals_moved_table(tmp_path, name, rows, supplied):
             np.testing.assert_allclose(own, expected, rtol=CLOSE, atol=CLOSE, err_msg=output)
 
 
+def differences(ready):
+    """Richardson's differences of the variants of a study, shape (coordinates, rows, n)."""
+    count = len(ready.study.variation.coordinates)
+    steps = [np.eye(count) * STEP * share for share in (1.0, -1.0, 0.5, -0.5)]
+    plus, minus, half_plus, half_minus = np.split(
+        ready.values(np.concatenate(steps, axis=1))[0], 4, axis=2
+    )
+    found = (8.0 * (half_plus - half_minus) - plus + minus) / (6.0 * STEP)
+    return np.moveaxis(found, -1, 0)
+
+
 def compared(ready):
-    """The sensitivities of explain against the gradients of a study, over the largest."""
+    """The sensitivities of explain against differences of variants, over the largest."""
     study = ready.study
     found = diagnose(study.case, samples=3, tol=1e-12)
     values = study.case.sweep.values
     samples = [int(np.abs(values - each.value).argmin()) for each in found.samples]
     known = {(each.output, each.number): each.by_sample for each in found.sensitivities}
-    along = gradients(ready).along[:, :, samples]
+    whole = differences(ready)
+    along = whole[:, :, samples]
     names = [each.name for each in study.variation.coordinates]
     for r, row in enumerate(study.rows):
         if row.output.forces:
             continue
-        largest = np.nanmax(np.abs(along[:, r]))
+        largest = np.nanmax(np.abs(whole[:, r]))
         for k, name in enumerate(names):
             number = name if name.endswith(".length") else " ".join(name.rsplit(".", 1))
             without = np.where(np.isnan(along[k, r]), np.nan, 0.0)

@@ -57,8 +57,10 @@ def take_turns(
     contestants: Mapping[Key, Work],
     rounds: int,
     progress: Callable[[float], object] = lambda done: None,
+    clock: Callable[[], float] = perf_counter,
 ) -> dict[Key, Spread]:
-    """Return the seconds of one call of each contestant, over rounds in which each has a turn.
+    """Return the seconds of one call of each contestant by a clock, over rounds in which each has a
+    turn.
 
     Each is called before all rounds. Quick work is also called before each turn, untimed, to refill
     the caches after the previous contestant. Python's garbage is collected only between rounds.
@@ -73,7 +75,7 @@ def take_turns(
             gc.collect()
             gc.disable()
             for key, work in contestants.items():
-                times[key].append(_turn(work, calls[key]))
+                times[key].append(_turn(work, calls[key], clock))
             gc.enable()
     finally:
         (gc.enable if enabled else gc.disable)()
@@ -92,13 +94,13 @@ def warm_up(work: Work, clock: Callable[[], float] | None = None) -> float:
     return least
 
 
-def _turn(work: Work, calls: int) -> float:
+def _turn(work: Work, calls: int, clock: Callable[[], float]) -> float:
     if calls > 1:
         work()
-    begin = perf_counter()
+    begin = clock()
     for _ in range(calls):
         work()
-    return (perf_counter() - begin) / calls
+    return (clock() - begin) / calls
 
 
 # Independent chains: enough to hide the latency of two units (2 x 4 cycles), and few enough for 16

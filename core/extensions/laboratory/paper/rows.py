@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from ....algebra import ZERO, Mat3, Scalar, Vec3, X, Y, Z, cross, vec
 from ....errors import SolveError
@@ -305,19 +305,26 @@ class PaperDrivenAngle(DrivenAngle):
 class PaperConstantVelocity(ConstantVelocity):
     """The difference of two dot10 in body axes."""
 
+    dot: ClassVar[type[PaperDot10]] = PaperDot10
+
     @property
     def pair(self) -> tuple[Dot10, Dot10]:
         """The two dot10 that are subtracted."""
-        return PaperDot10(self.f_i, self.g_j), PaperDot10(self.g_i, self.f_j)
+        return self.dot(self.f_i, self.g_j), self.dot(self.g_i, self.f_j)
+
+    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
+        (plus,), (minus,) = (dot.rows(i, j) for dot in self.pair)
+        return (Row(ZERO, plus.pi - minus.pi, ZERO, plus.pj - minus.pj),)
+
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
+        (plus,), (minus,) = (dot.gamma(i, j, vi, vj) for dot in self.pair)
+        return (plus - minus,)
 
 
-class ConventionalConstantVelocity(ConstantVelocity):
+class ConventionalConstantVelocity(PaperConstantVelocity):
     """The difference of two dot10 by full products."""
 
-    @property
-    def pair(self) -> tuple[Dot10, Dot10]:
-        """The two dot10 that are subtracted."""
-        return ConventionalDot10(self.f_i, self.g_j), ConventionalDot10(self.g_i, self.f_j)
+    dot = ConventionalDot10
 
 
 PAPER: Mapping[type[Primitive], Any] = {
