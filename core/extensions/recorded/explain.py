@@ -13,6 +13,7 @@ import numpy as np
 
 from ...case.case import TIME, Case, Quantity, Series, Sweep
 from ...case.io.reference_samples import RATES
+from ...case.units import LENGTHS
 from ...errors import shortened
 from ...harness.compare import Curve, curve_of, deviation
 from ...harness.suspects import FACTORS, OTHER_SIGN, slips
@@ -29,7 +30,7 @@ _STEPS = 8
 _NAMED = 3
 _UNITS: Mapping[str, Mapping[str, float]] = {
     "rad": {"rad": 1.0, "deg": math.pi / 180.0},
-    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254},
+    "m": {name: LENGTHS[name].size for name in ("m", "mm", "cm", "inch")},
     "s": {"s": 1.0, "ms": 1e-3},
 }
 
