@@ -285,7 +285,7 @@ def test_foreign_database_is_unchanged(path):
         Store(path)
     assert path.read_bytes() == before
     path.write_bytes(b"not a database at all" * 100)
-    with pytest.raises(HistoryError, match="file is not a database. Give another file"):
+    with pytest.raises(HistoryError, match=r"file is not a database\. Give another file"):
         Store(path)
 
 
@@ -299,7 +299,7 @@ def test_empty_history_file_stays_empty(path, command, capsys):
 
 def test_impossible_history_files_are_refused(tmp_path):
     with pytest.raises(
-        HistoryError, match="unable to open database file. Give a file in a folder that exists"
+        HistoryError, match=r"unable to open database file\. Give a file in a folder that exists"
     ):
         Store(tmp_path / "no" / "history.sqlite")
     with pytest.raises(HistoryError, match="there is no such file"):
