@@ -110,7 +110,7 @@ class Tabular:
     def plot(self, *names: str) -> Figure:
         """Draw the curves with matplotlib, one diagram for each variable, and return the figure.
 
-        A record of a table of hardpoints is drawn in the table's units, everything else in SI.
+        A record is drawn in the units of its case's file, everything else in SI.
 
         Args:
             names: variables to draw; by default all, or of a record the six that tell most.

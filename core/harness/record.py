@@ -71,7 +71,7 @@ class RecordTable(Tabular):
         )
 
     def drawn(self) -> Dataset:
-        """Return the dataset in the units of the case's table of hardpoints, or in SI."""
+        """Return the dataset in the units of the case's file."""
 
         def converted(each: Variable, unit: str) -> Variable:
             name, size = in_table_units(unit, self.table)
@@ -411,8 +411,8 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
         solved, samples: number of samples reached, and number of samples.
         us_per_step: time of the warm solve per sample [us] without waiting for the processor,
             including the forces of outputs; null unless all samples were reached.
-        table: units of a table of hardpoints, and the type of its driver; absent for other cases,
-            and in records of older versions.
+        table: units of the case's file, and the type of its driver; absent for a file in SI, and
+            in records of older versions.
         faults: what is wrong with an answer beside deviations: missing or contradicted samples,
             residual, balance of power, bodies, degrees of freedom; `message` repeats them. Empty in
             records of older versions.
@@ -445,7 +445,7 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
     reasons: dict[str, str] = {}
     details: dict[str, Any] = {}
     evidence: Evidence | None = None
-    table: dict[str, dict[str, str]] | msgspec.UnsetType = msgspec.UNSET
+    table: dict[str, Any] | msgspec.UnsetType = msgspec.UNSET
     faults: list[str] = []
 
     @property

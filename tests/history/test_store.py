@@ -285,7 +285,7 @@ def test_foreign_database_is_unchanged(path):
         Store(path)
     assert path.read_bytes() == before
     path.write_bytes(b"not a database at all" * 100)
-    with pytest.raises(HistoryError, match="file is not a database; give another file"):
+    with pytest.raises(HistoryError, match=r"file is not a database\. Give another file"):
         Store(path)
 
 
@@ -299,7 +299,7 @@ def test_empty_history_file_stays_empty(path, command, capsys):
 
 def test_impossible_history_files_are_refused(tmp_path):
     with pytest.raises(
-        HistoryError, match="unable to open database file; give a file in a folder that exists"
+        HistoryError, match=r"unable to open database file\. Give a file in a folder that exists"
     ):
         Store(tmp_path / "no" / "history.sqlite")
     with pytest.raises(HistoryError, match="there is no such file"):
@@ -333,7 +333,7 @@ def test_full_disk_keeps_stored_records(path):
     keeping.end(results, interrupted=False)
     (problem,) = keeping.problems
     assert problem.startswith(
-        f"history {path}: cannot be written: database or disk is full; make room. The records"
+        f"history {path}: cannot be written: database or disk is full. Make room. The records"
         " before "
     )
     assert len(results.records) == 40  # the run went on
@@ -383,7 +383,7 @@ def test_disk_error_during_run_keeps_results(path):
     out, err = process.communicate()
     assert process.returncode == 2
     assert (
-        f"kincheck: history {path}: cannot be written: disk I/O error; check the disk: it may be"
+        f"kincheck: history {path}: cannot be written: disk I/O error. Check the disk: it may be"
         " full" in err
     )
     assert len(msgspec.json.decode(out)["records"]) == 3

@@ -11,7 +11,7 @@ import msgspec
 from ...case.case import Case
 from ...case.io.document import measure
 from ...case.units import FORCES, Unit
-from ...errors import KincheckError, unknown
+from ...errors import KincheckError
 from ...mechanism.loads import ForceElement, SpringDamper
 from ...mechanism.mechanism import Vector
 from ..hardpoints.suspension import MotionRatio
@@ -19,6 +19,7 @@ from .rates import SIDES
 from .section import KEY, rig_of
 
 TIRE = "tire"
+TIRES = (TIRE, "tyre")
 """Name of the spring under each wheel, which makes a ride rate of the wheel rate."""
 RATES: Mapping[str, Unit] = {
     name: Unit(name, size, size.__mul__)
@@ -52,8 +53,9 @@ def springs_in(texts: Sequence[str]) -> dict[str, Rate]:
             stiffness = preload = math.nan
         if not (unit and of_force and 0.0 < stiffness < math.inf and math.isfinite(preload)):
             raise KincheckError(
-                f"--spring {text!r}: expected a rate in {', '.join(RATES)}, and perhaps the force"
-                f' at design in N or kN. Say {EXAMPLE}, or "spring: 35 N/mm, 3 kN"'
+                f"--spring {text!r}: expected a name and a rate in {', '.join(RATES)}, with a"
+                f" decimal point, and perhaps the force at design in N or kN. Say {EXAMPLE}, or"
+                ' "spring: 35.5 N/mm, 3 kN"'
             )
         found[name.strip()] = (stiffness, preload)
     return found
@@ -82,13 +84,16 @@ def with_springs(case: Case, springs: Mapping[str, Rate]) -> Case:
     places, mechanism, made = places_of(case), case.mechanism, list[SpringDamper]()
     for name, given in springs.items():
         rate, force = given if isinstance(given, tuple) else (given, 0.0)
-        if name == TIRE:
+        if name in TIRES:
             rig = msgspec.structs.replace(rig_of(case), tire_stiffness=rate)
             case = replace(case, tables={**case.tables, KEY: rig})
             continue
         if name not in places:
-            what = unknown("spring", name, [*places, TIRE])
-            raise KincheckError(f"{case.name}: --spring: {what}. {how_to_add(case)}")
+            known = ", ".join([*places, TIRE])
+            raise KincheckError(
+                f"{case.name}: --spring: there is no spring {name!r}, but {known}."
+                f" {how_to_add(case)}"
+            )
         for ratio in places[name]:
             first, second = (mechanism.point(point) for point in ratio.between)
             ends = first.position, second.position

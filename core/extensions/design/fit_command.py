@@ -135,7 +135,7 @@ def facts(found: Fitted, out: Path | None = None, checked: str | None = None) ->
         "misfit": found.first.misfit,
         "numbers": rig.count,
         "noise": {
-            goal.output: {"deviation": median(noise), "source": what}
+            goal.output: {"deviation": median(noise.tolist()), "source": what}
             for goal, noise, what in zip(rig.goals, rig.noise, rig.sources, strict=True)
         },
         "directions": [

@@ -94,7 +94,8 @@ def _curves(found: Fitted) -> Iterator[Diagram]:
         yield pages.over_travel(2 * k, goal.output, goal.unit, rig.case, curves, band)
         rest = [(_RIG, measured - new, "markers")]
         what, around = f"{goal.output} less the fitted table", (-half, half, band[2])
-        yield pages.over_travel(2 * k + 1, what, goal.unit, rig.case, rest, around)
+        beside = pages.over_travel(2 * k + 1, what, goal.unit, rig.case, rest, around)
+        yield replace(beside, styles=[_DRAWING, _FIT, _RIG])
 
 
 def _combinations(found: Fitted) -> Section:

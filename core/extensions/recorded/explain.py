@@ -13,6 +13,7 @@ import numpy as np
 
 from ...case.case import TIME, Case, Quantity, Series, Sweep
 from ...case.io.reference_samples import RATES
+from ...case.units import LENGTHS
 from ...errors import shortened
 from ...harness.compare import Curve, curve_of, deviation
 from ...harness.suspects import FACTORS, OTHER_SIGN, slips
@@ -29,7 +30,7 @@ _STEPS = 8
 _NAMED = 3
 _UNITS: Mapping[str, Mapping[str, float]] = {
     "rad": {"rad": 1.0, "deg": math.pi / 180.0},
-    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254},
+    "m": {name: LENGTHS[name].size for name in ("m", "mm", "cm", "inch")},
     "s": {"s": 1.0, "ms": 1e-3},
 }
 
@@ -305,16 +306,21 @@ def _stating(words: str, name: str, stated: Mapping[str, Stated]) -> list[str]:
     """
     if (own := stated.get(name)) is None:
         return []
+    sign, offset = own.sign, own.offset / own.size
+    if words.startswith(OTHER_SIGN):
+        sign, offset = -sign, -offset
+        words = words.removeprefix(OTHER_SIGN).removeprefix(" and ")
+        if not words:
+            return [_map(own, name, sign, offset, own.unit)]
+        if not words.startswith("times "):
+            return []
     first, number, *_ = f"{words} -".split()
-    offset = own.offset / own.size
-    if words == OTHER_SIGN:
-        return [_map(own, name, -own.sign, -offset, own.unit)]
     if first in ("plus", "minus") and " and " not in words:
         added = float(number) / own.size * (1.0 if first == "plus" else -1.0)
-        return [_map(own, name, own.sign, offset + added, own.unit)]
+        return [_map(own, name, sign, offset + added, own.unit)]
     size = own.size * FACTORS.get(words.removeprefix("times "), math.nan)
     units = [unit for unit, each in _UNITS.get(own.si, {}).items() if math.isclose(each, size)]
-    return [_map(own, name, own.sign, offset, unit) for unit in units]
+    return [_map(own, name, sign, offset, unit) for unit in units]
 
 
 def _map(stated: Stated, name: str, sign: float, offset: float, unit: str) -> str:

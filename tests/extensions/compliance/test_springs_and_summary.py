@@ -69,10 +69,10 @@ def test_axle_has_springs_on_both_sides(table, tmp_path):
 @pytest.mark.parametrize(
     ("spring", "said"),
     [
-        ("spring: 35", "expected a rate in N/m, N/mm"),
-        ("spring: -35 N/mm", "expected a rate"),
+        ("spring: 35", "expected a name and a rate in N/m, N/mm"),
+        ("spring: -35 N/mm", "expected a name and a rate"),
         ("spring: 35 N/mm, 3", "and perhaps the force at design in N or kN"),
-        ("damper: 35 N/mm", "there is no spring 'damper'; known: spring, tire"),
+        ("damper: 35 N/mm", "there is no spring 'damper', but spring, tire"),
     ],
 )
 def test_other_springs_are_refused(table, capsys, spring, said):

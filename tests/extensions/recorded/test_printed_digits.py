@@ -134,6 +134,16 @@ def test_digits_of_wrong_recording_fail(recorded, form):
     assert (status, record["errors"]["x"]["position"]["worst_step"]) == (1, 10)
 
 
+def test_sign_with_unit_names_option(recorded):
+    turn = GRIDS["few"]
+    place, swing = closed_form(turn)
+    text = text_of(digits(9), turn, place * [1.0, -1.0], swing).replace("y [mm]", "Y")
+    status, record = recorded(text, "--map", "y=Y [m]")
+    assert status == 1
+    assert 'If it is meant, say --map "y=-Y [mm]"' in record["message"]
+    assert recorded(text, "--map", "y=-Y [mm]")[0] == 0
+
+
 def test_driver_that_somebody_set(recorded):
     """Numbers of one or two digits are exact beside outputs of more."""
     turn = np.array([0.0, 0.3, 0.7, 1.2, 1.9])
@@ -224,7 +234,7 @@ def test_planar_poses_are_judged(recorded):
     assert recorded(planar(turn, "", 180.0 / np.pi), *stated)[0] == 0
     status, record = recorded(planar(turn, "", -1.0), *PLANAR)
     assert status == 1
-    assert "read as euler 3 inverted the gap is within" in record["message"]
+    assert "Read as euler 3 inverted the gap is within" in record["message"]
 
 
 RATES = {

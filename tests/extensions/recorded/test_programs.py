@@ -128,7 +128,7 @@ open(sys.argv[2], "w").write("tip.z,tip.x\\n" + "0,\\n" * 20 + "nan,nan\\n")
 @pytest.mark.parametrize("words", ["{samples}", "{samples} {out} {other}", "{out} {"])
 def test_malformed_engine_command_is_refused(judged, capsys, words):
     assert judged("prog", words)[0] == 2
-    assert 'say --engine-command "prog {case} {samples} {out}"' in capsys.readouterr().err
+    assert 'Say --engine-command "prog {case} {samples} {out}"' in capsys.readouterr().err
 
 
 def test_missing_program_is_refused(judged, capsys):

@@ -183,7 +183,7 @@ RESULTS = (DATA / "fourbar.res").read_text()
 TWO = RESULTS.replace("</Data>\n<Term", "</Data><Data name='dynamic_002'></Data>\n<Term")
 REFUSED = {
     "MotionSolve": ("a.abf", b"\0", "of MotionSolve. In HyperGraph, export the curves as CSV"),
-    "Simpack": ("a.sbr", b"\0", "Simpack; in its PostProcessor, export the channels as CSV"),
+    "Simpack": ("a.sbr", b"\0", "Simpack. In its PostProcessor, export the channels as CSV"),
     "requests": ("a.req", b"\0", "a request file of Adams. Say RESULTS/XRF in the deck"),
     "level 7.3": ("a.mat", b"MATLAB 7.3 MAT-file", "of version 7.3. In MATLAB: save"),
     "no MAT-file": ("a.mat", b"junk" * 99, "found no readable MAT-file"),
@@ -194,7 +194,7 @@ REFUSED = {
         "the analyses 'kinematic_001', 'dynamic_002', expected one. Say --analysis NAME",
     ),
     "cut off": ("a.res", RESULTS[:5000], "not valid XML"),
-    "old text": ("a.res", "1 2 3\n", "say RESULTS/XRF in the deck, which writes XML"),
+    "old text": ("a.res", "1 2 3\n", "Say RESULTS/XRF in the deck, which writes XML"),
     "entities": ("a.res", "<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>", "expected"),
     # a matrix without rows is left out
     "no rows": (
@@ -222,7 +222,7 @@ def test_matlab_zip_bomb_is_refused(judged, tmp_path, capsys):
     packed = zlib.compress(bytes(300_000_000), 9)
     data = head + struct.pack("<II", 15, len(packed)) + packed
     assert judged(write(tmp_path, data, "run.mat"))[0] == 2
-    assert "bytes when unpacked; write fewer samples or channels" in capsys.readouterr().err
+    assert "bytes when unpacked: write fewer samples or channels" in capsys.readouterr().err
 
 
 COLUMNS = [2, 5, 7, 8, 13, 14, 16, 18, 21]
@@ -272,8 +272,8 @@ def test_wrong_number_in_adams_is_located(judged, tmp_path, number, text):
 @pytest.mark.parametrize(
     ("file", "wrong", "right"),
     [
-        ("fourbar_123.csv", "euler 321 a b c", "read as euler 123 the gap"),
-        ("fourbar_xyzw.csv", "quaternion wxyz qx qy qz qw", "read as quaternion xyzw the gap"),
+        ("fourbar_123.csv", "euler 321 a b c", "Read as euler 123 the gap"),
+        ("fourbar_xyzw.csv", "quaternion wxyz qx qy qz qw", "Read as quaternion xyzw the gap"),
         ("fourbar_xyzw.csv", "quaternion xyzw inverted qx qy qz qw", "quaternion xyzw the gap"),
         ("fourbar_xyzw.csv", XYZW + ", position x y z [mm]", "positions in m, not mm, the gap"),
     ],

@@ -80,6 +80,11 @@ def test_same_motion_names_lost_facts(text, lost, tmp_path):
     assert bool(found["lost"]) == bool(lost)
 
 
+def test_radians_for_degrees_are_named(tmp_path):
+    degrees, unit = SAME["degrees"]
+    assert unit in "; ".join(against(tmp_path, GRIPPER, first=degrees)["lost"])
+
+
 DIFFERENT = {
     "no mimic": (GRIPPER.replace(MIMIC, ""), "freedom 1 against 2: right.mimic in a.urdf only"),
     "sense of the mimic": (GRIPPER.replace('"-1"', '"1"'), "right.mimic"),
@@ -272,7 +277,7 @@ SLIDE = """<mujoco><worldbody><body name="a"><joint name="ja" axis="0 1 0"/>
 
 
 @pytest.mark.parametrize("form", ["mjcf", "osim", "sdf", "urdf"])
-def test_spring_of_slide_is_same_between_points(form, tmp_path):
+def test_spring_of_slide_between_points(form, tmp_path):
     """Formats have it between two points, or an export writes it so."""
     first = write(tmp_path, SLIDE, "first.xml")
     texts = written(load(first, driven("ja:0:0.1:3", hold_rest=True)), writer_of(form), None)
