@@ -82,8 +82,9 @@ class MeasureCompliance(Isolated, _Formed):  # pyright: ignore[reportUntypedBase
         "FILE",
     )
     spring: tuple[str, ...] = option(
-        "spring between two points of the case, by the name of its motion ratio without _ratio, of"
-        ' an axle on both sides: --spring "spring: 35 N/mm", with its force at design'
+        "spring between two points of the case, by the name of its motion ratio without _ratio or"
+        " by the table's own, as Feder of Feder unten and Feder oben, of an axle on both sides:"
+        ' --spring "spring: 35 N/mm", with its force at design'
         ' "spring: 35 N/mm, 3 kN". "tire: 200 N/mm" is under the wheel, for the ride rate. May be'
         " repeated",
         metavar='"NAME: RATE"',

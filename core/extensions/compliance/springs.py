@@ -68,11 +68,34 @@ def places_of(case: Case) -> dict[str, list[MotionRatio]]:
     found = dict[str, list[MotionRatio]]()
     for output in case.outputs:
         if isinstance(output, MotionRatio):
-            name = output.name.removesuffix("_ratio")
-            for side in SIDES:
-                name = name.removeprefix(f"{side}_")
-            found.setdefault(name, []).append(output)
+            found.setdefault(_without_side(output.name.removesuffix("_ratio")), []).append(output)
     return found
+
+
+def written_names(case: Case) -> dict[str, str]:
+    """Return the names of springs by what the table itself calls them: the name of one of the two
+    points, or the words that both have, as Feder of Feder unten and Feder oben. A name of two
+    springs is left out, as that of a point to which both are fixed.
+    """
+    found = dict[str, set[str]]()
+    for name, ratios in places_of(case).items():
+        roles = {_without_side(point) for ratio in ratios for point in ratio.between}
+        rows = [
+            each.name
+            for each in case.hardpoints
+            if roles & {*each.roles} and each.name not in each.roles
+        ]
+        words = [row.split() for row in rows]
+        common = (word for word in words[0] if all(word in each for each in words)) if rows else ()
+        for written in filter(None, (*rows, " ".join(common))):
+            found.setdefault(written, set()).add(name)
+    return {written: name for written, (name, *others) in found.items() if not others}
+
+
+def _without_side(name: str) -> str:
+    for side in SIDES:
+        name = name.removeprefix(f"{side}_")
+    return name
 
 
 def with_springs(case: Case, springs: Mapping[str, Rate]) -> Case:
@@ -82,24 +105,26 @@ def with_springs(case: Case, springs: Mapping[str, Rate]) -> Case:
         KincheckError: the case has no points of such a spring.
     """
     places, mechanism, made = places_of(case), case.mechanism, list[SpringDamper]()
+    written = written_names(case)
     for name, given in springs.items():
         rate, force = given if isinstance(given, tuple) else (given, 0.0)
         if name in TIRES:
             rig = msgspec.structs.replace(rig_of(case), tire_stiffness=rate)
             case = replace(case, tables={**case.tables, KEY: rig})
             continue
-        if name not in places:
-            known = ", ".join([*places, TIRE])
+        if (there := written.get(name, name)) not in places:
+            known = ", ".join([*places, *written, TIRE])
             raise KincheckError(
                 f"{case.name}: --spring: there is no spring {name!r}, but {known}."
                 f" {how_to_add(case)}"
             )
-        for ratio in places[name]:
+        for ratio in places[there]:
             first, second = (mechanism.point(point) for point in ratio.between)
             ends = first.position, second.position
-            if there := [each.name for each in mechanism.forces if {*ends} <= {*_ends(each)}]:
+            present = (*mechanism.forces, *made)
+            if old := [each.name for each in present if {*ends} <= {*_ends(each)}]:
                 raise KincheckError(
-                    f"{case.name}: --spring: {there[0]!r} of the case is between {first.name} and"
+                    f"{case.name}: --spring: {old[0]!r} of the case is between {first.name} and"
                     f" {second.name} already. Leave out {name!r}"
                 )
             label = f"{ratio.name.removesuffix('_ratio')} of --spring"

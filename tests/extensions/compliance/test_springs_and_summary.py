@@ -66,6 +66,30 @@ def test_axle_has_springs_on_both_sides(table, tmp_path):
     assert found["roll_stiffness"]["position"][0] == pytest.approx(track**2 / 2 * rate)
 
 
+def test_spring_has_the_tables_own_name(tmp_path, capsys):
+    """Of a German table: what both points are called, one of them, or kincheck's name."""
+    table, out = tmp_path / "achse.csv", tmp_path / "kc.json"
+    text = sample_table(TEMPLATES["double_wishbone"])
+    table.write_text(
+        text.replace("spring_lower,", "Feder unten,").replace("spring_upper,", "Feder oben,")
+    )
+    names = tmp_path / "namen.toml"
+    names.write_text('spring_lower = "Feder unten"\nspring_upper = "Feder oben"\n')
+    line = ["kc", str(table), f"--names={names}", "--travel=0", f"--json={out}"]
+    rates = list[float]()
+    for name in ("spring", "Feder", "Feder oben"):
+        assert main([*line, "--spring", f"{name}: 35 N/mm"]) == 0
+        rates.append(json.loads(out.read_text())["outputs"]["wheel_rate"]["position"][0])
+    assert rates == [rates[0]] * 3
+    capsys.readouterr()
+    assert main([*line, "--spring", "Dämpfer: 35 N/mm"]) == 2
+    assert "no spring 'Dämpfer', but spring, Feder unten, Feder oben, Feder, tire" in (
+        capsys.readouterr().err
+    )
+    assert main([*line, "--spring=spring: 35 N/mm", "--spring=Feder: 35 N/mm"]) == 2
+    assert "already. Leave out 'Feder'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("spring", "said"),
     [
