@@ -1,13 +1,13 @@
 # Two commands:  make run   the McPherson strut in every engine, compared and reported
 #                make test  style, types and tests
 # make board builds the short board of time steppers into board/.
-# make docs builds the documentation into site/.
+# make docs builds the documentation into site/, and make film writes its film again.
 # Plain Python with venv is enough; uv is used when it is there.
 PYTHON ?= python3
 BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null)
 
-.PHONY: run test types tests board nightly docs lock sizes house mutants fuzz clean
+.PHONY: run test types tests board nightly docs film lock sizes house mutants fuzz clean
 
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
@@ -36,6 +36,10 @@ nightly: .venv/ready
 # Pages, figures and reference pages; a warning is an error.
 docs: .venv/docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
+
+# The tour of the README and of the front page, after a change of the pages it shows: a minute. It needs Chromium.
+film: .venv/ready
+	$(BIN)/python -m docs.film
 
 .venv/docs: .venv/ready
 ifdef UV

@@ -50,8 +50,8 @@ def FIGURES() -> dict[str, str | bytes]:  # noqa: N802
         car = _files("start/suspension.md")
         return {
             **{
-                f"figures/{name}.png": (ROOT / ".github" / f"{name}.png").read_bytes()
-                for name in ("report", "live")
+                f"figures/{name}": (ROOT / ".github" / name).read_bytes()
+                for name in ("report.png", "live.png", "tour.webp")
             },
             "figures/strut-errors.svg": strut_errors(),
             "examples/report.html": example_report(),

@@ -75,10 +75,11 @@ def places_of(case: Case) -> dict[str, list[MotionRatio]]:
 def written_names(case: Case) -> dict[str, str]:
     """Return the names of springs by what the table itself calls them: the name of one of the two
     points, or the words that both have, as Feder of Feder unten and Feder oben. A name of two
-    springs is left out, as that of a point to which both are fixed.
+    springs is left out, as that of a point to which both are fixed. So is one that is also a name
+    of `places_of`, which has precedence.
     """
-    found = dict[str, set[str]]()
-    for name, ratios in places_of(case).items():
+    places, found = places_of(case), dict[str, set[str]]()
+    for name, ratios in places.items():
         roles = {_without_side(point) for ratio in ratios for point in ratio.between}
         rows = [
             each.name
@@ -89,7 +90,11 @@ def written_names(case: Case) -> dict[str, str]:
         common = (word for word in words[0] if all(word in each for each in words)) if rows else ()
         for written in filter(None, (*rows, " ".join(common))):
             found.setdefault(written, set()).add(name)
-    return {written: name for written, (name, *others) in found.items() if not others}
+    return {
+        written: name
+        for written, (name, *others) in found.items()
+        if not others and written not in places
+    }
 
 
 def _without_side(name: str) -> str:
