@@ -1,8 +1,12 @@
 """Blocks of a page, and the comparison of shown with printed output."""
 
+import importlib
+import re
+
 import pytest
 from kincheck.core.cli import every_command
 
+from ..support.sources import ROOT
 from .page import blocks, builder, commands, differences
 
 PAGE = """
@@ -69,3 +73,17 @@ def test_reference_pages_list_commands_and_types():
     assert "`--missing-is-failure`" in commands_page
     assert "| `revolute` |" in pages["reference/types.md"]
     assert "[closure]" in pages["reference/case-file.md"]
+
+
+def test_described_names_are_where_the_site_looks():
+    """It reads sources, so what an extension offers by kincheck.core is described where it is
+    defined.
+    """
+    page = ROOT / "docs" / "pages" / "reference" / "python.md"
+    if not page.exists():
+        pytest.skip("the documentation is not here")
+    found = re.findall(r"^::: (kincheck\.core(?:\.\w+)*)\.(\w+)$", page.read_text(), re.MULTILINE)
+    assert len(found) > 30
+    for module, name in found:
+        where = importlib.import_module(module)
+        assert name in getattr(where, "__all__", vars(where)), f"{module}.{name}"
