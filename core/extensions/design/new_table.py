@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import degrees, radians
 from pathlib import Path
+
+import numpy as np
 
 from ...case.case import Case
 from ...cli.registry import Registry
@@ -18,11 +21,46 @@ from ..hardpoints.read import case_of_hardpoints
 from ..hardpoints.reader import read_hardpoints
 from ..hardpoints.saving import write_table
 from ..hardpoints.table import Hardpoint, HardpointTable, unit_of
+from ..hardpoints.templates import WHEEL_AXIS
+from ..sweep.curves import curves
+from .rods import assembles, with_rods
+from .search import with_rows
 
 CHECKS = ("mujoco", "pinocchio", "exudyn")
 """Engines that solve the answer again, the first that is installed."""
 DIGITS = 12
 """Digits of written coordinates: a thousandth of the accuracy of the bands and more."""
+
+NO_MOVE = 1e-12
+"""Smaller moves are round-off of an assembly [m]."""
+
+
+def _assembled(case: Case, moves: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the moves of all rows to where the car comes together at design, by place, and the
+    angles of the wheel there, if no row states its axis.
+    """
+    sweep = replace(case.sweep, values=np.array([case.sweep.design]))
+    marked, rows = with_rows(replace(case, sweep=sweep, reference={}))
+    marked, places = with_rods(marked, [*moves])
+    sides = {
+        f"static_{angle}": next(
+            each.name for each in case.outputs if each.name in (angle, f"left_{angle}")
+        )
+        for angle in ("toe", "camber")
+        if not any(WHEEL_AXIS in row.roles for row in case.hardpoints)
+    }
+    names = [each for row in rows.values() for each in row] + [*sides.values()]
+    still, found = (
+        curves(marked, places, [each], names).values
+        for each in (np.zeros(len(moves)), [*moves.values()])
+    )
+    moved = {
+        f"{row} {axis}": float((found[name] - still[name])[0, 0])
+        for row, own in rows.items()
+        for axis, name in zip("xyz", own, strict=True)
+    }
+    angles = {key: degrees(float(found[name][0, 0])) for key, name in sides.items()}
+    return moved, {key: radians(float(f"{x:.{DIGITS}g}")) for key, x in angles.items()}
 
 
 def require_new(out: Path | None, suffix: str = ".csv") -> None:
@@ -77,11 +115,14 @@ class NewTable:
         supplied = options.supplied
         table = read_hardpoints(Path(options.case), supplied)
         size = unit_of(table, supplied.units).size
+        if assembles(moves):
+            moves, angles = _assembled(old, moves)
+            table = replace(table, **angles)
         points = list[tuple[float, float, float]]()
         for name, each in table.points.items():
             x, y, z = (
-                float(f"{value + moves[place] / size:.{DIGITS}g}")
-                if (place := f"{name} {axis}") in moves
+                float(f"{value + move / size:.{DIGITS}g}")
+                if abs(move := moves.get(f"{name} {axis}", 0.0)) > NO_MOVE
                 else value
                 for axis, value in zip("xyz", each.position, strict=True)
             )

@@ -64,7 +64,7 @@ class Tune(OfCase):
         Raises:
             KincheckError: a goal or move makes no sense, or the table does not reach its travel.
         """
-        from .goals import points_of, read_goals, read_moves
+        from .goals import parts_of, read_goals, read_moves
         from .new_table import table_of
         from .search import read_clear
         from .tune import tune
@@ -72,7 +72,7 @@ class Tune(OfCase):
         case = table_of(self, registry)
         case, goals, notes = read_goals(self.goal, case, self.supplied)
         clear = read_clear(self.keep_clear, case)
-        return tune(case, goals, read_moves(self.move, points_of(case)), self.starts, clear, notes)
+        return tune(case, goals, read_moves(self.move, parts_of(case)), self.starts, clear, notes)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
