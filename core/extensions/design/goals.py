@@ -22,10 +22,10 @@ from ...cli.shared_options import driver_value
 from ...errors import CaseError, KincheckError, unknown
 from ...trajectory import Array
 from ..hardpoints.options import WheelOptions
-from .rods import ends_of, rods_of
+from .rods import LENGTH, SHIM, ends_of, rods_of, with_sides
 
 GOAL = '--goal "OUTPUT [at TRAVEL] = VALUE +- TOLERANCE UNIT"'
-MOVE = '--move "POINT: AXES +- BOX UNIT"'
+MOVE = '--move "POINT: [shim] AXES +- BOX UNIT" or "ROD: length +- BOX UNIT"'
 SAME = 1e-9
 """Travels closer than this are one sample [m or rad]."""
 _GOAL = re.compile(
@@ -33,8 +33,8 @@ _GOAL = re.compile(
     r"(?:\+-|\+/-|±)\s*(?P<tolerance>.+?)\s*"
 )
 _MOVE = re.compile(
-    r"\s*(?P<points>[^:]+?)\s*:\s*(?P<kind>length\b|shim\b)?\s*(?P<axes>[xyz](?:[\s,]*[xyz])*)?\s*"
-    r"(?P<box>[+±].*?)?\s*"
+    r"\s*(?P<points>[^:]+?)\s*:\s*(?:(?P<kind>length|shim)\b)?\s*(?P<axes>[xyz](?:[\s,]*[xyz])*)?"
+    r"\s*(?P<box>[+±].*?)?\s*"
 )
 _BOX = re.compile(r"(?:\+-|\+/-|±)?\s*(?P<both>[^+-]*)|\+(?P<high>[\d.\s]+)-(?P<low>[^+-]+)")
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
@@ -155,7 +155,7 @@ def points_of(case: Case) -> Movable:
 
 def parts_of(case: Case) -> Movable:
     """Return the points of a table, its rods, and the rows that may have a shim."""
-    found, ends = points_of(case), ends_of(case)
+    found, ends = points_of(case), ends_of(with_sides(case))
     rods = {name: name for name in rods_of(case).values()}
     return replace(
         found, rods=rods, ends={name: row for name, row in found.rows.items() if row in ends}
@@ -180,18 +180,17 @@ def read_moves(texts: Sequence[str], movable: Movable, usual: str = "") -> dict[
                 ' "tierod_inner: y z +- 15 mm"'
             )
         box = read_box(read["box"] or usual, f"move {text!r}", movable)
-        kind, axes = read["kind"] or "point", re.findall("[xyz]", read["axes"] or "xyz")
-        known, what = movable.rows, "point"
-        if kind == "length":
-            known, what, axes = movable.rods, "rod", [""]
-        elif kind == "shim":
-            known, what = movable.ends, "end of a rod"
+        what, known, kind = "point", movable.rows, ""
+        axes = [f" {axis}" for axis in re.findall("[xyz]", read["axes"] or "xyz")]
+        if read["kind"] == "length":
+            what, known, kind, axes = "rod", movable.rods, LENGTH, [""]
+        elif read["kind"] == "shim":
+            what, known, kind = "end of a rod or bare arm", movable.ends, SHIM
         for name in re.split(r"\s*,\s*", read["points"]):
             if name not in known:
                 raise KincheckError(f"move {text!r}: {unknown(what, name, known)}")
             for axis in axes:
-                place = f"{known[name]} {kind} {axis}".replace(" point ", " ").rstrip()
-                if place in found:
+                if (place := f"{known[name]}{kind}{axis}") in found:
                     raise KincheckError(f"move {text!r}: {place} is given twice; leave one out")
                 found[place] = box
     return found

@@ -1,4 +1,4 @@
-"""A table of hardpoints with moves of its points: its check by another engine, and its file."""
+"""A table of hardpoints with moves of points, rods and shims: its check, and its file."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def _assembled(case: Case, moves: Mapping[str, float]) -> tuple[dict[str, float]
     angles of the wheel there, if no row states its axis.
     """
     sweep = replace(case.sweep, values=np.array([case.sweep.design]))
-    marked, rows = with_rows(replace(case, sweep=sweep, reference={}))
-    marked, places = with_rods(marked, [*moves])
+    marked, places = with_rods(replace(case, sweep=sweep, reference={}), [*moves])
+    marked, rows = with_rows(marked)
     sides = {
         f"static_{angle}": next(
             each.name for each in case.outputs if each.name in (angle, f"left_{angle}")
@@ -50,16 +50,16 @@ def _assembled(case: Case, moves: Mapping[str, float]) -> tuple[dict[str, float]
         if not any(WHEEL_AXIS in row.roles for row in case.hardpoints)
     }
     names = [each for row in rows.values() for each in row] + [*sides.values()]
-    still, found = (
-        curves(marked, places, [each], names).values
-        for each in (np.zeros(len(moves)), [*moves.values()])
-    )
+    offsets = np.vstack([np.zeros(len(moves)), [*moves.values()]])
+    found = {
+        name: each[:, 0] for name, each in curves(marked, places, offsets, names).values.items()
+    }
     moved = {
-        f"{row} {axis}": float((found[name] - still[name])[0, 0])
+        f"{row} {axis}": float(np.diff(found[name])[0])
         for row, own in rows.items()
         for axis, name in zip("xyz", own, strict=True)
     }
-    angles = {key: degrees(float(found[name][0, 0])) for key, name in sides.items()}
+    angles = {key: degrees(found[name][1]) for key, name in sides.items()}
     return moved, {key: radians(float(f"{x:.{DIGITS}g}")) for key, x in angles.items()}
 
 
@@ -90,16 +90,18 @@ def table_of(options: OfCase, registry: Registry) -> Case:
 
 @dataclass(frozen=True, eq=False)
 class NewTable:
-    """A table with moves of its points.
+    """A table with moves of its points, put together at design.
 
     Attributes:
         points: in the units and axes of the table.
+        moves: of its rows, by place [m].
         old, case: of the table, and with the moves, at the same samples.
     """
 
     table: HardpointTable
     supplied: WheelOptions
     points: Sequence[tuple[float, float, float]]
+    moves: Mapping[str, float]
     old: Case
     case: Case
 
@@ -132,7 +134,7 @@ class NewTable:
         new = case_of_hardpoints(replace(table, points=moved), supplied)
         sweep = replace(new.sweep, values=old.sweep.values)
         new = replace(new, name=f"{old.name} new", sweep=sweep, reference={})
-        return cls(table, supplied, points, old, new)
+        return cls(table, supplied, points, moves, old, new)
 
     def check(self, registry: Registry) -> str | None:
         """Return the engine that confirms the native one; None without any.

@@ -1,7 +1,8 @@
-"""Rods of other lengths, and shims at the ends of rods.
+"""Rods of other lengths, and shims at the ends of rods and arms.
 
 A rod keeps its length here, instead of following its points. Then the car comes together elsewhere
-at design: the wheel keeps its height, and turns. The curves are those of the assembled car.
+at design: the wheel keeps its height, and turns. The curves are those of the assembled car. An arm
+with nothing but a ball joint holds the knuckle as two rods along its sides do.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...algebra import vec
 from ...case.case import Case, Hardpoint
 from ...errors import KincheckError
-from ...joints import Distance, Translational
+from ...joints import Distance, Revolute, Spherical, Translational
+from ...mechanism.mechanism import GROUND
 from ..hardpoints.suspension import Side
 
-LENGTH, SHIM = " length", " shim"
+LENGTH, SHIM = ": length", ": shim"
 """What follows the name of a rod, or of a row, in a place."""
 _SIDE = re.compile(rf"({'|'.join(Side)})_")
 
@@ -26,6 +29,48 @@ def rods_of(case: Case) -> dict[str, str]:
     """Return the name of each rod by its joint; those of both sides of an axle have one name."""
     rods = [each.name for each in case.mechanism.joints if isinstance(each, Distance)]
     return {joint: _SIDE.sub("", joint, count=1) for joint in rods}
+
+
+def with_sides(case: Case) -> Case:
+    """Return the case with two rods in place of each arm with nothing but a ball joint."""
+    mechanism = case.mechanism
+    if mechanism.bushings or mechanism.forces:
+        return case
+    for pivot in mechanism.joints:
+        if not isinstance(pivot, Revolute) or pivot.i != GROUND:
+            continue
+        arm, rest = pivot.j, [each for each in mechanism.joints if each is not pivot]
+        ball, *others = [each for each in rest if arm in each.bodies]
+        laden = others or any(each.body == arm for each in mechanism.points)
+        if laden or not isinstance(ball, Spherical) or ball.i != arm:
+            continue
+        feet = vec(pivot.point), vec(pivot.point) + vec(pivot.axis)
+        rods = [
+            Distance(f"{arm}_side_{k}", GROUND, ball.j, ((foot.x, foot.y, foot.z), ball.point))
+            for k, foot in enumerate(feet, 1)
+        ]
+        joints = [*(each for each in rest if each is not ball), *rods]
+        bodies = [each for each in mechanism.bodies if each.name != arm]
+        mechanism = replace(mechanism, bodies=bodies, joints=joints)
+        hardpoints = list[Hardpoint]()
+        for row in case.hardpoints:
+            moves = dict(row.moves)
+            foot, along, outer = (
+                moves.pop(place, np.zeros((3, 3)))
+                for place in (
+                    *(f"joints.{pivot.name}.{part}" for part in ("point", "axis")),
+                    f"joints.{ball.name}.point",
+                )
+            )
+            for rod, by_row in zip(rods, (foot, foot + along), strict=True):
+                moves |= {
+                    f"joints.{rod.name}.points.{end}": each
+                    for end, each in enumerate((by_row, outer))
+                    if each.any()
+                }
+            hardpoints.append(replace(row, moves=moves))
+        case = replace(case, mechanism=mechanism, hardpoints=tuple(hardpoints))
+    return case
 
 
 def ends_of(case: Case) -> dict[str, set[str]]:
@@ -54,17 +99,19 @@ def with_rods(case: Case, places: Sequence[str]) -> tuple[Case, list[str]]:
     """
     if not assembles(places):
         return case, [*places]
+    case = with_sides(case)
     rods, ends = rods_of(case), ends_of(case)
     longer = {each.removesuffix(LENGTH) for each in places if each.endswith(LENGTH)}
     kept = {joint for joint, name in rods.items() if name in longer}
     for each in places:
         kept |= ends[each.partition(SHIM)[0]] if SHIM in each else set[str]()
     for each in places:
-        if held := kept & ends.get(each.rpartition(" ")[0], set()):
+        row, _, axis = each.rpartition(" ")
+        if held := kept & ends.get(row, set()):
             name = rods[min(held)]
             raise KincheckError(
-                f"move {each}: {name} keeps its length, so a new place of its end is a shim; say"
-                f" {each.replace(' ', f':{SHIM} ')}, or leave out the other moves of {name}"
+                f"move {each}: {name} keeps its length by another move, so its end moves by a shim"
+                f" alone; say {row}{SHIM} {axis}, or leave one out"
             )
     joints = [
         replace(each, length=each.rod_length)

@@ -81,9 +81,9 @@ class Search:
 
     def __post_init__(self) -> None:
         self.box = np.array([*self.boxes.values()])
+        self.case, self.places = with_rods(self.case, [*self.boxes])
         if self.clear:
             self.case, self.rows = with_rows(self.case)
-        self.case, self.places = with_rods(self.case, [*self.boxes])
         self.names = list(dict.fromkeys(each.output for each in self.goals))
 
     @property
@@ -142,7 +142,7 @@ def with_rows(case: Case) -> tuple[Case, dict[str, list[str]]]:
     outputs, hardpoints = [*case.outputs], [*case.hardpoints]
     for k, row in enumerate(case.hardpoints):
         found = re.match(r"(points|joints)\.(.+?)\.[a-z]+(?:\.(\d))?$", next(iter(row.moves), ""))
-        if found is None:
+        if found is None or not row.axes:  # a rod's length
             continue
         kind, name, end = found.groups()
         body = mechanism.point(name).body if kind == "points" else ""

@@ -36,7 +36,8 @@ class Tune(OfCase):
     )
     move: tuple[str, ...] = option(
         'points that may move, their axes in the table and their box: "tierod_inner: y z +- 15 mm",'
-        ' "uca_outer: z +5 -10 mm"; may be repeated',
+        ' "uca_outer: z +5 -10 mm"; the length of a rod: "tie_rod: length +- 5 mm"; shims:'
+        ' "uca_front, uca_rear: shim y +- 4 mm"; may be repeated',
         metavar="MOVE",
         several="repeated",
         required=True,
@@ -86,15 +87,16 @@ class Tune(OfCase):
         require_new(self.out)
         refuse(self.unwritable())
         found = self.answer(registry)
-        out, checked, others = None, None, ()
+        out, checked, others, moves = None, None, (), found.moves
         if found.reached:
             new = NewTable.of(self, found.case, found.moves)
             checked, others, out = new.check(registry), new.compare(registry), self.out
+            moves = new.moves
             if out is not None:
                 new.write(out)
         told = report(found, checked, others)
         if self.page is not None:
-            write("--page", self.page, pages.page(told, found.case, found.moves).encode())
+            write("--page", self.page, pages.page(told, found.case, moves).encode())
         with with_json(_facts(found, checked, out), self.json) as console:
             print_report(told, cast(TextIO, console.file))
             if out is not None:

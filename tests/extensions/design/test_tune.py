@@ -36,18 +36,23 @@ def turned(w, x):
     return along + np.cos(angle) * (x - along) + np.sin(angle) * np.cross(k, x)
 
 
-def poses(points, travel=TRAVEL):
+def lengths(points):
+    inner, outer = (np.array([points[rod[k]] for rod in RODS]) for k in (0, 1))
+    return np.linalg.norm(outer - inner, axis=-1)
+
+
+def poses(points, travel=TRAVEL, kept=None):
     """Return the displacement and the rotation vector of the knuckle at each travel, shape (n, 6):
     six equations by Newton's method.
     """
     center = points["wheel_center"]
     inner, outer = (np.array([points[rod[k]] for rod in RODS]) for k in (0, 1))
-    rest = np.sum((outer - inner) ** 2, axis=-1)
+    rest = (lengths(points) if kept is None else kept) ** 2
 
     def rows(q):
         ends = center + q[..., None, :3] + turned(q[..., None, 3:], outer - center)
-        lengths = np.sum((ends - inner) ** 2, axis=-1) - rest
-        return np.concatenate([lengths, q[..., 2:3] - travel[:, None]], axis=-1)
+        off = np.sum((ends - inner) ** 2, axis=-1) - rest
+        return np.concatenate([off, q[..., 2:3] - travel[:, None]], axis=-1)
 
     q, steps = np.zeros((len(travel), 6)), 1e-6 * np.eye(6)[:, None]
     for _ in range(30):
@@ -210,6 +215,63 @@ def test_tune_axle_means_both_wheels(car):
     assert status == 0
     assert [each["output"] for each in both["bands"]] == ["left_toe", "right_toe"]
     assert both["moves_m"] == pytest.approx(one["moves_m"], abs=1e-8)
+
+
+def test_tune_rods_and_shims_meet_the_assembled_car(car):
+    moves = (
+        "tie_rod: length +- 9 mm",
+        "uca_front, uca_rear: shim y +- 15 mm",
+        "tierod_inner: shim z +- 9 mm",
+        "lca_outer: z +- 40 mm",
+    )
+    goals = ["toe = 0.1 +- 0.05 deg", "camber at 0mm = -1 +- 0.01 deg"]
+    status, found, new = tune(car, goals, *moves, more=["--axle", "heave", "--starts", "1"])
+    assert status == 0
+    by = found["moves_m"]
+    assert min(abs(by["tie_rod: length"]), abs(by["lca_outer z"])) > 1e-4
+    shims = {each.replace(": shim", ""): move for each, move in by.items() if ": shim" in each}
+    table = moved([by["lca_outer z"]], ["lca_outer z"])
+    kept = lengths(table) + by["tie_rod: length"] * np.array([0, 0, 0, 0, 1])
+    for place, offset in shims.items():
+        name, axis = place.split()
+        table[name]["xyz".index(axis)] += offset
+    q, center = poses(table, kept=kept), table["wheel_center"]
+    x, y, z = turned(q[:, 3:], np.array([0.0, 1.0, 0.0])).T
+    toe, camber = np.arctan2(x, y), -np.arcsin(z)
+    assert np.abs(toe / DEG - 0.1).max() == pytest.approx(0.05, abs=1e-6)
+    assert camber[3] / DEG == pytest.approx(-0.99, abs=1e-6)
+    written = kincheck.load(new, kincheck.Supplied(travel="30mm:7"))
+    curves = kincheck.curves(written, ["tierod_inner z"], [[0.0]], ["toe", "camber"]).values
+    assert curves["toe"][0] == pytest.approx(toe, abs=1e-10)
+    assert curves["camber"][0] == pytest.approx(camber, abs=1e-10)
+    points = {each.name: np.array(each.position) for each in written.hardpoints}
+    for name in ("uca_outer", "lca_outer", "tierod_outer", "wheel_center", "wheel_contact"):
+        place = center + q[3, :3] + turned(q[3, 3:], table[name] - center)
+        assert points[name] == pytest.approx(place, abs=1e-11)
+    assert points["uca_front"] == pytest.approx(table["uca_front"], abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("goal", "moves", "message"),
+    [
+        (GOALS[0], ["tie_rd: length +- 1 mm"], "did you mean 'tie_rod'?"),
+        (GOALS[0], ["lca_front: shim y +- 1 mm"], "no end of a rod or bare arm 'lca_front'"),
+        (
+            GOALS[0],
+            ["tie_rod: length +- 1 mm", "tierod_inner: y +- 1 mm"],
+            "tierod_inner y: tie_rod keeps its length by another move",
+        ),
+        (
+            "half_track_change = 0 +- 9 mm",
+            ["tie_rod: length +- 1 mm"],
+            "half_track_change counts from design",
+        ),
+    ],
+)
+def test_tune_unfit_rods_and_shims_are_refused(car, capsys, goal, moves, message):
+    words = [word for move in moves for word in ("--move", move)]
+    assert main(["tune", str(car), "--goal", goal, *words]) == 2
+    assert message in capsys.readouterr().err
 
 
 def test_tune_search_stops_before_lock_up():
