@@ -40,9 +40,9 @@ def with_sides(case: Case) -> Case:
         if not isinstance(pivot, Revolute) or pivot.i != GROUND:
             continue
         arm, rest = pivot.j, [each for each in mechanism.joints if each is not pivot]
-        ball, *others = [each for each in rest if arm in each.bodies]
-        laden = others or any(each.body == arm for each in mechanism.points)
-        if laden or not isinstance(ball, Spherical) or ball.i != arm:
+        held = [each for each in rest if arm in each.bodies]
+        laden = len(held) != 1 or any(each.body == arm for each in mechanism.points)
+        if laden or not isinstance(ball := held[0], Spherical) or ball.i != arm:
             continue
         feet = vec(pivot.point), vec(pivot.point) + vec(pivot.axis)
         rods = [

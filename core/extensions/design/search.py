@@ -141,7 +141,9 @@ def with_rows(case: Case) -> tuple[Case, dict[str, list[str]]]:
     mechanism, names, points = case.mechanism, dict[str, list[str]](), list[Point]()
     outputs, hardpoints = [*case.outputs], [*case.hardpoints]
     for k, row in enumerate(case.hardpoints):
-        found = re.match(r"(points|joints)\.(.+?)\.[a-z]+(?:\.(\d))?$", next(iter(row.moves), ""))
+        # an axis leads to its second point, which another joint may hold
+        place = min(row.moves, key=lambda each: each.endswith(".axis"), default="")
+        found = re.match(r"(points|joints)\.(.+?)\.[a-z]+(?:\.(\d))?$", place)
         if found is None or not row.axes:  # a rod's length
             continue
         kind, name, end = found.groups()

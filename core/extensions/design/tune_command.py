@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import TYPE_CHECKING, Any
 
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
@@ -77,9 +77,6 @@ class Tune(OfCase):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...case.io.atomic_files import write
-        from ...report.sections import print_report
-        from ...report.terminal import with_json
         from . import pages
         from .new_table import NewTable, require_new
         from .tune_views import report
@@ -95,12 +92,8 @@ class Tune(OfCase):
             if out is not None:
                 new.write(out)
         told = report(found, checked, others)
-        if self.page is not None:
-            write("--page", self.page, pages.page(told, found.case, moves).encode())
-        with with_json(_facts(found, checked, out), self.json) as console:
-            print_report(told, cast(TextIO, console.file))
-            if out is not None:
-                print(f"\n{out}: written", file=console.file)
+        facts, written = _facts(found, checked, out), f"{out}: written" if out else ""
+        pages.tell(self, facts, told, lambda: pages.page(told, found.case, moves), written)
         return Status.WITHIN if found.reached else Status.DEVIATES
 
 
