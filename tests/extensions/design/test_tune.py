@@ -1,13 +1,17 @@
 """kincheck tune, against an own double wishbone and another optimiser."""
 
 import json
+from types import SimpleNamespace
 
 import kincheck
 import msgspec
 import numpy as np
 import pytest
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.design.goals import parts_of
 from kincheck.core.extensions.design.least_move import least_move
+from kincheck.core.extensions.design.new_table import NewTable
+from kincheck.core.extensions.design.rods import with_rods
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.harness import run as running
 from kincheck.core.harness.record import Outcome
@@ -249,6 +253,36 @@ def test_tune_rods_and_shims_meet_the_assembled_car(car):
         place = center + q[3, :3] + turned(q[3, 3:], table[name] - center)
         assert points[name] == pytest.approx(place, abs=1e-11)
     assert points["uca_front"] == pytest.approx(table["uca_front"], abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    "template",
+    [
+        pytest.param(name, marks=pytest.mark.nightly if name != "mcpherson" else ())
+        for name in TEMPLATES
+        if name != "semi_trailing_arm"
+    ],
+)
+def test_tune_new_table_has_curves_of_assembled_car(car, template):
+    """All outputs but those that count from design."""
+    head, _ = car.read_text().split("name,x,y,z")
+    sample = TEMPLATES[template].sample.items()
+    lines = [f"{name},{','.join(repr(float(1e3 * x)) for x in at)}" for name, at in sample]
+    head = head.replace("double_wishbone", template)
+    car.write_text(head + "\n".join(["name,x,y,z", *lines, ""]))
+    command = SimpleNamespace(case=car, supplied=kincheck.Supplied(travel="10mm:3"))
+    old = kincheck.load(car, command.supplied)
+    parts, random = parts_of(old), np.random.default_rng(1)
+    places = [f"{rod}: length" for rod in parts.rods]
+    places += [f"{row}: shim {axis}" for row in {*parts.ends.values()} for axis in "xyz"]
+    moves = dict(zip(places, random.uniform(-1e-3, 1e-3, len(places)).tolist(), strict=True))
+    new = NewTable.of(command, old, moves).case
+    kept, names = with_rods(old, places)
+    assembled = kincheck.curves(kept, names, [[*moves.values()]]).values
+    written = kincheck.curves(new, ["wheel_center z"], [[0.0]]).values
+    off = {name: np.abs(assembled[name] - each).max() for name, each in written.items()}
+    from_design = {each for each in off if each in ("half_track_change", "rocker_twist")}
+    assert {name for name, each in off.items() if each > 1e-9} == from_design
 
 
 @pytest.mark.parametrize(
