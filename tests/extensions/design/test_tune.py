@@ -221,7 +221,7 @@ def test_tune_axle_means_both_wheels(car):
     assert both["moves_m"] == pytest.approx(one["moves_m"], abs=1e-8)
 
 
-def test_tune_rods_and_shims_meet_the_assembled_car(car):
+def test_tune_shims_meet_assembled_car(car):
     moves = (
         "tie_rod: length +- 9 mm",
         "uca_front, uca_rear: shim y +- 15 mm",
@@ -263,7 +263,7 @@ def test_tune_rods_and_shims_meet_the_assembled_car(car):
         if name != "semi_trailing_arm"
     ],
 )
-def test_tune_new_table_has_curves_of_assembled_car(car, template):
+def test_tune_table_of_assembled_car(car, template):
     """All outputs but those that count from design."""
     head, _ = car.read_text().split("name,x,y,z")
     sample = TEMPLATES[template].sample.items()
@@ -302,7 +302,7 @@ def test_tune_new_table_has_curves_of_assembled_car(car, template):
         ),
     ],
 )
-def test_tune_unfit_rods_and_shims_are_refused(car, capsys, goal, moves, message):
+def test_tune_unfit_rods_are_refused(car, capsys, goal, moves, message):
     words = [word for move in moves for word in ("--move", move)]
     assert main(["tune", str(car), "--goal", goal, *words]) == 2
     assert message in capsys.readouterr().err
