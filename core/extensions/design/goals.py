@@ -73,6 +73,11 @@ class Box:
         return max(-self.low, self.high)
 
 
+def times(sizes: Mapping[str, float], u: Array) -> dict[str, float]:
+    """Return sizes by place times factors, shape (places,)."""
+    return {place: size * x for (place, size), x in zip(sizes.items(), u.tolist(), strict=True)}
+
+
 @dataclass(frozen=True, eq=False)
 class _Draft:
     """A goal whose samples are not known yet."""

@@ -14,7 +14,7 @@ from ...report.axis import number
 from ...trajectory import Array
 from ..hardpoints.suspension.base import Change
 from ..hardpoints.suspension.wheel import Twist
-from .goals import Box, Goal, travel_of
+from .goals import Box, Goal, times, travel_of
 from .least_move import HELD, LeastMove, least_move
 from .rods import assembles
 from .search import Clear, Search
@@ -147,7 +147,8 @@ def tune(
     """
     if assembles(boxes):
         _require_absolute(case, goals)
-    search = Search(case, goals, {place: each.size for place, each in boxes.items()}, clear)
+    sizes = {place: each.size for place, each in boxes.items()}
+    search = Search(case, goals, sizes, clear)
     low = np.array([each.low for each in boxes.values()]) / search.box
     high = np.array([each.high for each in boxes.values()]) / search.box
     before = search.values(np.zeros(len(boxes)))
@@ -172,7 +173,7 @@ def tune(
     pairs = combinations(goals, 2)
     return Tuned(
         *(case, best),
-        dict(zip(boxes, (best.moves * search.box).tolist(), strict=True)),
+        times(sizes, best.moves),
         *(boxes, bands),
         [*dict.fromkeys(np.array(search.parts)[worst].tolist())] if not best.held else [],
         not best.held and any(_disjoint(*pair) for pair in pairs),
