@@ -51,9 +51,13 @@ def _assembled(case: Case, moves: Mapping[str, float]) -> tuple[dict[str, float]
     }
     names = [each for row in rows.values() for each in row] + [*sides.values()]
     offsets = np.vstack([np.zeros(len(moves)), [*moves.values()]])
-    found = {
-        name: each[:, 0] for name, each in curves(marked, places, offsets, names).values.items()
-    }
+    solved = curves(marked, places, offsets, names)
+    if not solved.solved.all():
+        raise KincheckError(
+            f"{case.name}: with the new rods and shims the car does not come together at design"
+            f" ({solved.messages.get(1, 'no reason given')}); give smaller boxes"
+        )
+    found = {name: each[:, 0] for name, each in solved.values.items()}
     moved = {
         f"{row} {axis}": float(np.diff(found[name])[0])
         for row, own in rows.items()
@@ -110,7 +114,7 @@ class NewTable:
         """Return the table of a command with moves by place [m].
 
         Raises:
-            KincheckError: the command has a case, and no table.
+            KincheckError: the command has a case, and no table, or the car does not come together.
         """
         if isinstance(options.case, Case):
             raise KincheckError(f"{old.name}: is a case without a file; give the table's path")

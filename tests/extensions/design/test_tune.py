@@ -308,6 +308,12 @@ def test_tune_unfit_rods_are_refused(car, capsys, goal, moves, message):
     assert message in capsys.readouterr().err
 
 
+def test_tune_rod_without_assembly_is_refused(car):
+    command = SimpleNamespace(case=car, supplied=kincheck.Supplied())
+    with pytest.raises(kincheck.KincheckError, match="does not come together at design"):
+        NewTable.of(command, kincheck.load(car), {"tie_rod: length": 0.4})
+
+
 def test_tune_search_stops_before_lock_up():
     def bands(u):
         return (1.8 - u, -np.eye(1)) if u[0] < 0.5 else None
