@@ -21,7 +21,7 @@ from ...errors import KincheckError, unknown
 from ...harness.suspects import FACTORS
 from ...report.axis import ZERO
 from ...trajectory import Array
-from .goals import Movable, points_of, read_box, read_moves, travel_of
+from .goals import Movable, points_of, read_box, read_moves, times, travel_of
 from .identify import Combination, combinations, source, without_effect
 from .likely import Estimate, most_likely
 from .rig import ROUND_OFF, Rig, RigModel, read_rig, with_scatter
@@ -55,17 +55,17 @@ class Shift:
 
     Attributes:
         direction: over the noise, for a size of one, shape (numbers,).
-        size, deviation: by how much the rig reads too much [SI].
         unit: of its text.
+        size, deviation: by how much the rig reads too much [SI].
         chance: probability of a shift as large, if there is none.
     """
 
     name: str
     direction: Array
-    size: float
-    deviation: float
     unit: Unit
-    chance: float
+    size: float = 0.0
+    deviation: float = np.inf
+    chance: float = 1.0
 
     @property
     def si(self) -> str:
@@ -170,14 +170,12 @@ class Fitted:
     @property
     def moves(self) -> dict[str, float]:
         """The most likely moves from the drawing, by place [m]."""
-        moved = self.estimate.u * np.array([*self.boxes.values()])
-        return dict(zip(self.boxes, moved.tolist(), strict=True))
+        return times(self.boxes, self.estimate.u)
 
     @property
     def deviations(self) -> dict[str, float]:
         """The deviation of each move [m]."""
-        sizes = np.sqrt(np.diag(self.estimate.covariance)) * np.array([*self.boxes.values()])
-        return dict(zip(self.boxes, sizes.tolist(), strict=True))
+        return times(self.boxes, np.sqrt(np.diag(self.estimate.covariance)))
 
 
 def fit(
@@ -251,14 +249,12 @@ def fit_rig(
         estimate = _estimate(model, [*freed, *found])
     at = tests[len(offsets) :]
     worst = max(at, key=lambda each: abs(each.size / each.deviation))
-    box = np.array([*boxes.values()])
-    moves = dict(zip(boxes, (estimate.u * box).tolist(), strict=True))
     every_shift = [*freed, *found]
     return Fitted(
         *(rig, boxes, first, estimate, offsets),
         [_alone(each, k, every_shift, estimate) for k, each in enumerate(found, len(freed))],
         *(worst.words, slips or [*_slips(model, estimate)], combinations(estimate, boxes)),
-        without_effect(*model.over_travel(estimate.u), rig.case, moves, box),
+        without_effect(*model.over_travel(estimate.u), rig.case, boxes, times(boxes, estimate.u)),
         *(idle, predictions(model, estimate)),
     )
 
@@ -286,14 +282,14 @@ def _offsets(model: RigModel, estimate: Estimate) -> Iterator[Shift]:
     values = rig.of(model.values(estimate.u))
     for goal in rig.goals:
         rows = rig.rows(goal) * rig.weights
-        yield Shift(f"{goal.output} zero", rows, 0.0, np.inf, goal.unit, 1.0)
+        yield Shift(f"{goal.output} zero", rows, goal.unit)
         if (rows * values).any():
-            yield Shift(f"{goal.output} scale", rows * values, 0.0, np.inf, percent, 1.0)
+            yield Shift(f"{goal.output} scale", rows * values, percent)
     if (slopes := model.by_travel(estimate.u)) is not None:
         along = -slopes * rig.weights
         travel = np.array([rig.case.sweep.change[k] for _, k in rig.places])
-        yield Shift("travel zero", along, 0.0, np.inf, travel_of(rig.case)[1], 1.0)
-        yield Shift("travel scale", along * travel, 0.0, np.inf, percent, 1.0)
+        yield Shift("travel zero", along, travel_of(rig.case)[1])
+        yield Shift("travel scale", along * travel, percent)
 
 
 def _samples(rig: Rig) -> Iterator[Shift]:
@@ -304,7 +300,7 @@ def _samples(rig: Rig) -> Iterator[Shift]:
         direction = np.zeros(rig.count)
         direction[k] = rig.weights[k]
         name = f"{goal.output} at {where}"
-        yield Shift(name, direction, 0.0, np.inf, goal.unit, 1.0)
+        yield Shift(name, direction, goal.unit)
 
 
 def _sized(shift: Shift, estimate: Estimate) -> Shift:

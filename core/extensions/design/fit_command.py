@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import TYPE_CHECKING, Any
 
 from ...case.io.reader_options import CurveOptions
 from ...cli.registry import Registry, Status
@@ -84,32 +84,28 @@ class Fit(OfCase):
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ...case.io.atomic_files import write
-        from ...report.sections import print_report
-        from ...report.terminal import with_json
         from .fit import Verdict
         from .fit_views import page, report
         from .new_table import NewTable, require_new
+        from .pages import tell
         from .rubber import new_bushings
 
         require_new(self.out, ".toml" if self.bushings else ".csv")
         refuse(self.unwritable())
         found = self.answer(registry)
         fits, checked = found.verdict is not Verdict.OFF, None
-        if fits and self.out is not None:
+        out, written = self.out if fits else None, ""
+        if out is not None:
+            written = f"{out}: written"
             if self.bushings is not None:
                 text = new_bushings(self.bushings, found.rig.case, found.moves)
-                write("--out", self.out, text.encode())
+                write("--out", out, text.encode())
             else:
                 new = NewTable.of(self, found.rig.case, found.moves)
                 checked = new.check(registry)
-                new.write(self.out)
-        if self.page is not None:
-            write("--page", self.page, page(found).encode())
-        with with_json(facts(found, self.out if fits else None, checked), self.json) as console:
-            print_report(report(found), cast(TextIO, console.file))
-            if fits and self.out is not None:
-                by = f", solved again by {checked}" if checked else ""
-                print(f"\n{self.out}: written{by}", file=console.file)
+                new.write(out)
+                written += f", solved again by {checked}" if checked else ""
+        tell(self, facts(found, out, checked), report(found), lambda: page(found), written)
         return Status.WITHIN if fits else Status.DEVIATES
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +22,10 @@ from ...cli.shared_options import driver_value
 from ...errors import CaseError, KincheckError, unknown
 from ...trajectory import Array
 from ..hardpoints.options import WheelOptions
+from .rods import LENGTH, SHIM, ends_of, rods_of, with_sides
 
 GOAL = '--goal "OUTPUT [at TRAVEL] = VALUE +- TOLERANCE UNIT"'
-MOVE = '--move "POINT: AXES +- BOX UNIT"'
+MOVE = '--move "POINT: [shim] AXES +- BOX UNIT" or "ROD: length +- BOX UNIT"'
 SAME = 1e-9
 """Travels closer than this are one sample [m or rad]."""
 _GOAL = re.compile(
@@ -32,7 +33,8 @@ _GOAL = re.compile(
     r"(?:\+-|\+/-|±)\s*(?P<tolerance>.+?)\s*"
 )
 _MOVE = re.compile(
-    r"\s*(?P<points>[^:]+?)\s*:\s*(?P<axes>[xyz](?:[\s,]*[xyz])*)?\s*(?P<box>[+±].*?)?\s*"
+    r"\s*(?P<points>[^:]+?)\s*:\s*(?:(?P<kind>length|shim)\b)?\s*(?P<axes>[xyz](?:[\s,]*[xyz])*)?"
+    r"\s*(?P<box>[+±].*?)?\s*"
 )
 _BOX = re.compile(r"(?:\+-|\+/-|±)?\s*(?P<both>[^+-]*)|\+(?P<high>[\d.\s]+)-(?P<low>[^+-]+)")
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
@@ -69,6 +71,11 @@ class Box:
     def size(self) -> float:
         """The larger of both, by which moves are measured."""
         return max(-self.low, self.high)
+
+
+def times(sizes: Mapping[str, float], u: Array) -> dict[str, float]:
+    """Return sizes by place times factors, shape (places,)."""
+    return {place: size * x for (place, size), x in zip(sizes.items(), u.tolist(), strict=True)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +141,14 @@ class Movable:
 
     Attributes:
         bare: unit of a box without one.
+        rods, ends: names of rods, and rows by all their names at the ends of rods alone.
     """
 
     rows: Mapping[str, str]
     units: Mapping[str, Unit]
     bare: str
+    rods: Mapping[str, str] = field(default_factory=dict[str, str])
+    ends: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
 def points_of(case: Case) -> Movable:
@@ -146,6 +156,15 @@ def points_of(case: Case) -> Movable:
     moving = [each for each in case.hardpoints if each.moves]
     rows = {role: each.name for each in moving for role in each.roles}
     return Movable(rows | {each.name: each.name for each in moving}, LENGTHS, case.length_unit)
+
+
+def parts_of(case: Case) -> Movable:
+    """Return the points of a table, its rods, and the rows that may have a shim."""
+    found, ends = points_of(case), ends_of(with_sides(case))
+    rods = {name: name for name in rods_of(case).values()}
+    return replace(
+        found, rods=rods, ends={name: row for name, row in found.rows.items() if row in ends}
+    )
 
 
 def read_moves(texts: Sequence[str], movable: Movable, usual: str = "") -> dict[str, Box]:
@@ -166,11 +185,17 @@ def read_moves(texts: Sequence[str], movable: Movable, usual: str = "") -> dict[
                 ' "tierod_inner: y z +- 15 mm"'
             )
         box = read_box(read["box"] or usual, f"move {text!r}", movable)
+        what, known, kind = "point", movable.rows, ""
+        axes = [f" {axis}" for axis in re.findall("[xyz]", read["axes"] or "xyz")]
+        if read["kind"] == "length":
+            what, known, kind, axes = "rod", movable.rods, LENGTH, [""]
+        elif read["kind"] == "shim":
+            what, known, kind = "end of a rod or bare arm", movable.ends, SHIM
         for name in re.split(r"\s*,\s*", read["points"]):
-            if name not in movable.rows:
-                raise KincheckError(f"move {text!r}: {unknown('point', name, movable.rows)}")
-            for axis in re.findall("[xyz]", read["axes"] or "xyz"):
-                if (place := f"{movable.rows[name]} {axis}") in found:
+            if name not in known:
+                raise KincheckError(f"move {text!r}: {unknown(what, name, known)}")
+            for axis in axes:
+                if (place := f"{known[name]}{kind}{axis}") in found:
                     raise KincheckError(f"move {text!r}: {place} is given twice; leave one out")
                 found[place] = box
     return found

@@ -77,7 +77,11 @@ def combinations(estimate: Estimate, boxes: Mapping[str, float]) -> list[Combina
 
 
 def without_effect(
-    slopes: Array, null: float, case: Case, moves: Mapping[str, float], box: Array
+    slopes: Array,
+    null: float,
+    case: Case,
+    boxes: Mapping[str, float],
+    moves: Mapping[str, float],
 ) -> list[str]:
     """Return names of combinations of moves without effect, as many as there are: places, points
     along the line to another one, all points together, and else their terms.
@@ -85,8 +89,9 @@ def without_effect(
     Args:
         slopes: by the moves over their boxes, rows of size one.
         null: round-off, over the largest effect.
-        moves: by place [m].
+        boxes, moves: by place [m].
     """
+    box = np.array([*boxes.values()])
     largest = np.linalg.norm(slopes, 2)
     names, known = list[str](), np.empty((0, len(box)))
     for name, direction in _candidates(case, moves):

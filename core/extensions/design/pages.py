@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, Protocol, TextIO, cast
 
 import msgspec
 import numpy as np
 
 from ...case.case import Case
+from ...case.io.atomic_files import write
 from ...case.units import Unit
 from ...harness.provenance import case_facts
 from ...harness.scene import scene
@@ -17,12 +19,33 @@ from ...report.axis import Axis, driver_axis
 from ...report.drawing import drawing
 from ...report.figures import OverDriver, Style, drawn_values
 from ...report.page_model import Plot
-from ...report.sections import Diagram, Report, environment, figure_parts
+from ...report.sections import Diagram, Report, environment, figure_parts, print_report
+from ...report.terminal import with_json
 from ...trajectory import Array
 from ...unit_text import with_unit
 from .goals import Goal, unit_in_table
 
 _GREY = "rgba(128,128,128,0.3)"
+
+
+class Tells(Protocol):
+    """A command with files of its answer."""
+
+    @property
+    def page(self) -> Path | None: ...
+
+    @property
+    def json(self) -> str | None: ...
+
+
+def tell(command: Tells, facts: Any, told: Report, drawn: Callable[[], str], written: str) -> None:
+    """Print a report, and write its page and its facts where a command asks for them."""
+    if command.page is not None:
+        write("--page", command.page, drawn().encode())
+    with with_json(facts, command.json) as console:
+        print_report(told, cast(TextIO, console.file))
+        if written:
+            print(f"\n{written}", file=console.file)
 
 
 def over_travel(

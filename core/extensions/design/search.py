@@ -18,6 +18,7 @@ from ...mechanism.mechanism import Point
 from ...trajectory import Array
 from ..sweep.curves import DesignCurves, curves
 from .goals import Goal
+from .rods import with_rods
 
 Curves: TypeAlias = Callable[..., DesignCurves]
 CLEAR = '--keep-clear "NAME: X0:X1 Y0:Y1 Z0:Z1 UNIT"'
@@ -79,9 +80,10 @@ class Search:
     rows: Mapping[str, list[str]] = field(default_factory=dict[str, list[str]])
 
     def __post_init__(self) -> None:
-        self.places, self.box = [*self.boxes], np.array([*self.boxes.values()])
+        self.box = np.array([*self.boxes.values()])
+        self.case, self.places = with_rods(self.case, [*self.boxes])
         if self.clear:
-            self.case, self.rows = _with_rows(self.case)
+            self.case, self.rows = with_rows(self.case)
         self.names = list(dict.fromkeys(each.output for each in self.goals))
 
     @property
@@ -132,15 +134,17 @@ class Search:
         return {name: values[0] for name, values in found.values.items()}
 
 
-def _with_rows(case: Case) -> tuple[Case, dict[str, list[str]]]:
+def with_rows(case: Case) -> tuple[Case, dict[str, list[str]]]:
     """Return the case with the points of all rows of the table, and the names of their coordinates
     along its axes by row: of an axle, those of the left wheel.
     """
     mechanism, names, points = case.mechanism, dict[str, list[str]](), list[Point]()
     outputs, hardpoints = [*case.outputs], [*case.hardpoints]
     for k, row in enumerate(case.hardpoints):
-        found = re.match(r"(points|joints)\.(.+?)\.[a-z]+(?:\.(\d))?$", next(iter(row.moves), ""))
-        if found is None:
+        # an axis leads to its second point, which another joint may hold
+        place = min(row.moves, key=lambda each: each.endswith(".axis"), default="")
+        found = re.match(r"(points|joints)\.(.+?)\.[a-z]+(?:\.(\d))?$", place)
+        if found is None or not row.axes:  # a rod's length
             continue
         kind, name, end = found.groups()
         body = mechanism.point(name).body if kind == "points" else ""

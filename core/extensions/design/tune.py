@@ -9,10 +9,14 @@ from itertools import combinations
 import numpy as np
 
 from ...case.case import Case
+from ...errors import KincheckError
 from ...report.axis import number
 from ...trajectory import Array
-from .goals import Box, Goal, travel_of
+from ..hardpoints.suspension.base import Change
+from ..hardpoints.suspension.wheel import Twist
+from .goals import Box, Goal, times, travel_of
 from .least_move import HELD, LeastMove, least_move
+from .rods import assembles
 from .search import Clear, Search
 
 TIGHT = 1e-5
@@ -141,7 +145,10 @@ def tune(
     Raises:
         KincheckError: the table does not reach its travel, or a goal has no value there.
     """
-    search = Search(case, goals, {place: each.size for place, each in boxes.items()}, clear)
+    if assembles(boxes):
+        _require_absolute(case, goals)
+    sizes = {place: each.size for place, each in boxes.items()}
+    search = Search(case, goals, sizes, clear)
     low = np.array([each.low for each in boxes.values()]) / search.box
     high = np.array([each.high for each in boxes.values()]) / search.box
     before = search.values(np.zeros(len(boxes)))
@@ -166,7 +173,7 @@ def tune(
     pairs = combinations(goals, 2)
     return Tuned(
         *(case, best),
-        dict(zip(boxes, (best.moves * search.box).tolist(), strict=True)),
+        times(sizes, best.moves),
         *(boxes, bands),
         [*dict.fromkeys(np.array(search.parts)[worst].tolist())] if not best.held else [],
         not best.held and any(_disjoint(*pair) for pair in pairs),
@@ -174,6 +181,20 @@ def tune(
         [each.norm if each.held else None for each in found],
         notes,
     )
+
+
+def _require_absolute(case: Case, goals: Sequence[Goal]) -> None:
+    from_design = {
+        each.name
+        for each in case.outputs
+        if isinstance(each, (Change, Twist)) or getattr(each, "relative", False)
+    }
+    for each in goals:
+        if each.output in from_design:
+            raise KincheckError(
+                f"goal {each.text!r}: {each.output} counts from design, which the lengths of rods"
+                " and shims move; leave the goal out, or move points alone"
+            )
 
 
 def _disjoint(one: Goal, other: Goal) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import TYPE_CHECKING, Any
 
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase
@@ -36,7 +36,8 @@ class Tune(OfCase):
     )
     move: tuple[str, ...] = option(
         'points that may move, their axes in the table and their box: "tierod_inner: y z +- 15 mm",'
-        ' "uca_outer: z +5 -10 mm"; may be repeated',
+        ' "uca_outer: z +5 -10 mm"; the length of a rod: "tie_rod: length +- 5 mm"; shims:'
+        ' "uca_front, uca_rear: shim y +- 4 mm"; may be repeated',
         metavar="MOVE",
         several="repeated",
         required=True,
@@ -64,7 +65,7 @@ class Tune(OfCase):
         Raises:
             KincheckError: a goal or move makes no sense, or the table does not reach its travel.
         """
-        from .goals import points_of, read_goals, read_moves
+        from .goals import parts_of, read_goals, read_moves
         from .new_table import table_of
         from .search import read_clear
         from .tune import tune
@@ -72,13 +73,10 @@ class Tune(OfCase):
         case = table_of(self, registry)
         case, goals, notes = read_goals(self.goal, case, self.supplied)
         clear = read_clear(self.keep_clear, case)
-        return tune(case, goals, read_moves(self.move, points_of(case)), self.starts, clear, notes)
+        return tune(case, goals, read_moves(self.move, parts_of(case)), self.starts, clear, notes)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...case.io.atomic_files import write
-        from ...report.sections import print_report
-        from ...report.terminal import with_json
         from . import pages
         from .new_table import NewTable, require_new
         from .tune_views import report
@@ -86,19 +84,16 @@ class Tune(OfCase):
         require_new(self.out)
         refuse(self.unwritable())
         found = self.answer(registry)
-        out, checked, others = None, None, ()
+        out, checked, others, moves = None, None, (), found.moves
         if found.reached:
             new = NewTable.of(self, found.case, found.moves)
             checked, others, out = new.check(registry), new.compare(registry), self.out
+            moves = new.moves
             if out is not None:
                 new.write(out)
         told = report(found, checked, others)
-        if self.page is not None:
-            write("--page", self.page, pages.page(told, found.case, found.moves).encode())
-        with with_json(_facts(found, checked, out), self.json) as console:
-            print_report(told, cast(TextIO, console.file))
-            if out is not None:
-                print(f"\n{out}: written", file=console.file)
+        facts, written = _facts(found, checked, out), f"{out}: written" if out else ""
+        pages.tell(self, facts, told, lambda: pages.page(told, found.case, moves), written)
         return Status.WITHIN if found.reached else Status.DEVIATES
 
 

@@ -193,8 +193,8 @@ def new_text(
         "axes": table.axes or supplied.axes,
         "side": table.side,
         "wheel_radius": table.wheel_radius,
-        "static_toe": table.static_toe and f"{math.degrees(table.static_toe)!r} deg",
-        "static_camber": table.static_camber and f"{math.degrees(table.static_camber)!r} deg",
+        "static_toe": table.static_toe and _degrees_text(table.static_toe),
+        "static_camber": table.static_camber and _degrees_text(table.static_camber),
     }
     text = StringIO()
     text.write("".join(f"# {key}: {value}\n" for key, value in known.items() if value))
@@ -203,6 +203,12 @@ def new_text(
     for name, row in zip(table.points, points, strict=True):
         writer.writerow([name, *map(_number_text, row)])
     return text.getvalue().encode()
+
+
+def _degrees_text(angle: float) -> str:
+    """Return an angle [rad] as text that is read as the same number, if one of 15 digits is."""
+    text = f"{math.degrees(angle):.15g}"
+    return f"{text if math.radians(float(text)) == angle else repr(math.degrees(angle))} deg"
 
 
 def _number_text(number: float) -> str:

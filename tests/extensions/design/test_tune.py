@@ -1,13 +1,17 @@
 """kincheck tune, against an own double wishbone and another optimiser."""
 
 import json
+from types import SimpleNamespace
 
 import kincheck
 import msgspec
 import numpy as np
 import pytest
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.design.goals import parts_of
 from kincheck.core.extensions.design.least_move import least_move
+from kincheck.core.extensions.design.new_table import NewTable
+from kincheck.core.extensions.design.rods import with_rods
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.harness import run as running
 from kincheck.core.harness.record import Outcome
@@ -36,18 +40,23 @@ def turned(w, x):
     return along + np.cos(angle) * (x - along) + np.sin(angle) * np.cross(k, x)
 
 
-def poses(points, travel=TRAVEL):
+def lengths(points):
+    inner, outer = (np.array([points[rod[k]] for rod in RODS]) for k in (0, 1))
+    return np.linalg.norm(outer - inner, axis=-1)
+
+
+def poses(points, travel=TRAVEL, kept=None):
     """Return the displacement and the rotation vector of the knuckle at each travel, shape (n, 6):
     six equations by Newton's method.
     """
     center = points["wheel_center"]
     inner, outer = (np.array([points[rod[k]] for rod in RODS]) for k in (0, 1))
-    rest = np.sum((outer - inner) ** 2, axis=-1)
+    rest = (lengths(points) if kept is None else kept) ** 2
 
     def rows(q):
         ends = center + q[..., None, :3] + turned(q[..., None, 3:], outer - center)
-        lengths = np.sum((ends - inner) ** 2, axis=-1) - rest
-        return np.concatenate([lengths, q[..., 2:3] - travel[:, None]], axis=-1)
+        off = np.sum((ends - inner) ** 2, axis=-1) - rest
+        return np.concatenate([off, q[..., 2:3] - travel[:, None]], axis=-1)
 
     q, steps = np.zeros((len(travel), 6)), 1e-6 * np.eye(6)[:, None]
     for _ in range(30):
@@ -210,6 +219,99 @@ def test_tune_axle_means_both_wheels(car):
     assert status == 0
     assert [each["output"] for each in both["bands"]] == ["left_toe", "right_toe"]
     assert both["moves_m"] == pytest.approx(one["moves_m"], abs=1e-8)
+
+
+def test_tune_shims_meet_assembled_car(car):
+    moves = (
+        "tie_rod: length +- 9 mm",
+        "uca_front, uca_rear: shim y +- 15 mm",
+        "tierod_inner: shim z +- 9 mm",
+        "lca_outer: z +- 40 mm",
+    )
+    goals = ["toe = 0.1 +- 0.05 deg", "camber at 0mm = -1 +- 0.01 deg"]
+    status, found, new = tune(car, goals, *moves, more=["--starts", "1"])
+    assert status == 0
+    by = found["moves_m"]
+    assert min(abs(by["tie_rod: length"]), abs(by["lca_outer z"])) > 1e-4
+    shims = {each.replace(": shim", ""): move for each, move in by.items() if ": shim" in each}
+    table = moved([by["lca_outer z"]], ["lca_outer z"])
+    kept = lengths(table) + by["tie_rod: length"] * np.array([0, 0, 0, 0, 1])
+    for place, offset in shims.items():
+        name, axis = place.split()
+        table[name]["xyz".index(axis)] += offset
+    q, center = poses(table, kept=kept), table["wheel_center"]
+    x, y, z = turned(q[:, 3:], np.array([0.0, 1.0, 0.0])).T
+    toe, camber = np.arctan2(x, y), -np.arcsin(z)
+    assert np.abs(toe / DEG - 0.1).max() == pytest.approx(0.05, abs=1e-6)
+    assert camber[3] / DEG == pytest.approx(-0.99, abs=1e-6)
+    written = kincheck.load(new, kincheck.Supplied(travel="30mm:7"))
+    curves = kincheck.curves(written, ["tierod_inner z"], [[0.0]], ["toe", "camber"]).values
+    assert curves["toe"][0] == pytest.approx(toe, abs=1e-10)
+    assert curves["camber"][0] == pytest.approx(camber, abs=1e-10)
+    points = {each.name: np.array(each.position) for each in written.hardpoints}
+    for name in ("uca_outer", "lca_outer", "tierod_outer", "wheel_center", "wheel_contact"):
+        place = center + q[3, :3] + turned(q[3, 3:], table[name] - center)
+        assert points[name] == pytest.approx(place, abs=1e-11)
+    assert points["uca_front"] == pytest.approx(table["uca_front"], abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    "template",
+    [
+        pytest.param(name, marks=pytest.mark.nightly if name != "mcpherson" else ())
+        for name in TEMPLATES
+        if name != "semi_trailing_arm"
+    ],
+)
+def test_tune_table_of_assembled_car(car, template):
+    """All outputs but those that count from design."""
+    head, _ = car.read_text().split("name,x,y,z")
+    sample = TEMPLATES[template].sample.items()
+    lines = [f"{name},{','.join(repr(float(1e3 * x)) for x in at)}" for name, at in sample]
+    head = head.replace("double_wishbone", template)
+    car.write_text(head + "\n".join(["name,x,y,z", *lines, ""]))
+    command = SimpleNamespace(case=car, supplied=kincheck.Supplied(travel="10mm:3", axle="heave"))
+    old = kincheck.load(car, command.supplied)
+    parts, random = parts_of(old), np.random.default_rng(1)
+    places = [f"{rod}: length" for rod in parts.rods]
+    places += [f"{row}: shim {axis}" for row in {*parts.ends.values()} for axis in "xyz"]
+    moves = dict(zip(places, random.uniform(-1e-3, 1e-3, len(places)).tolist(), strict=True))
+    new = NewTable.of(command, old, moves).case
+    kept, names = with_rods(old, places)
+    assembled = kincheck.curves(kept, names, [[*moves.values()]]).values
+    written = kincheck.curves(new, ["wheel_center z"], [[0.0]]).values
+    off = {name: np.abs(assembled[name] - each).max() for name, each in written.items()}
+    from_design = {each for each in off if each.endswith(("half_track_change", "rocker_twist"))}
+    assert {name for name, each in off.items() if each > 1e-9} == from_design
+
+
+@pytest.mark.parametrize(
+    ("goal", "moves", "message"),
+    [
+        (GOALS[0], ["tie_rd: length +- 1 mm"], "did you mean 'tie_rod'?"),
+        (GOALS[0], ["lca_front: shim y +- 1 mm"], "no end of a rod or bare arm 'lca_front'"),
+        (
+            GOALS[0],
+            ["tie_rod: length +- 1 mm", "tierod_inner: y +- 1 mm"],
+            "tierod_inner y: tie_rod keeps its length by another move",
+        ),
+        (
+            "half_track_change = 0 +- 9 mm",
+            ["tie_rod: length +- 1 mm"],
+            "half_track_change counts from design",
+        ),
+    ],
+)
+def test_tune_unfit_rods_are_refused(car, capsys, goal, moves, message):
+    words = [word for move in moves for word in ("--move", move)]
+    assert main(["tune", str(car), "--goal", goal, *words]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_tune_rod_without_assembly_is_refused(car):
+    command = SimpleNamespace(case=car, supplied=kincheck.Supplied())
+    with pytest.raises(kincheck.KincheckError, match="does not come together at design"):
+        NewTable.of(command, kincheck.load(car), {"tie_rod: length": 0.4})
 
 
 def test_tune_search_stops_before_lock_up():

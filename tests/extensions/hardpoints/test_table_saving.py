@@ -80,10 +80,10 @@ def test_saved_table_keeps_its_form(tmp_path, form):
 
 
 def test_quoted_numbers_make_a_new_table(tmp_path):
-    file = tmp_path / "car.csv"
-    file.write_text(text_of(",", ",", number=lambda x: f'"{x:.2f}"'))
+    file, toe = tmp_path / "car.csv", "# static_toe: 0.21 deg"
+    file.write_text(text_of(",", ",", [toe], number=lambda x: f'"{x:.2f}"'))
     new, points = saved(file)
-    assert new.read_text().splitlines()[3:5] == ["name,x,y,z", "uca_front,91.625,260,285"]
+    assert new.read_text().splitlines()[3:6] == [toe, "name,x,y,z", "uca_front,91.625,260,285"]
     assert {name: each.position for name, each in read_hardpoints(new).points.items()} == points
 
 
