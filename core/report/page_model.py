@@ -202,7 +202,7 @@ def case_view(given: Material, name: str, anchor: str) -> CaseView:
         here = [each for each in deviations if each.output == output]
         outputs.append(_output(given, output, f"{anchor}-{index}", here, records, axis))
     source = facts.get("source", "")
-    brief, more, _ = source.partition(";")
+    brief, more, _ = source.partition("; ")
     return CaseView(
         name=name,
         anchor=anchor,

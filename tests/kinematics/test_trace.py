@@ -184,7 +184,7 @@ def test_trace_without_singular_poses():
         ({"length": -1.0}, "length is -1.0, expected a positive number"),
         ({"longest": np.nan}, "longest is nan"),
         ({"tol": 0.0}, "tol is 0.0"),
-        ({"style": "dads"}, "no style 'dads'; known: native, paper"),
+        ({"style": "dads"}, "there is no style 'dads'; known: native,"),
         ({"points": ["hub"]}, "no point 'hub'; known: rod_end, wheel"),
     ],
     ids=str,

@@ -244,7 +244,7 @@ def _row(file: Path, where: str, row: str, columns: tuple[str, ...]) -> tuple[st
         raise fault(
             file,
             where,
-            f"{name}: found symmetry {shown(symmetry)}, expected a side:"
+            f"{name}: found symmetry {shown(symmetry)}, expected a side;"
             f" {remedy(symmetry, (*LEFT, RIGHT))}",
         )
     x, y, z = (number(file, f"{where}: {name}: {axis}", cells[axis]) for axis in COLUMNS[2:])

@@ -435,7 +435,7 @@ def _of_one_suspension(
             raise fault(
                 file,
                 "--sheet",
-                f"found no section {shown(wanted)}, expected one with points:"
+                f"found no section {shown(wanted)}, expected one with points;"
                 f" {remedy(wanted, known)}",
             )
         if rest := len(kept) - len(found):

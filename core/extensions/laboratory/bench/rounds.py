@@ -57,7 +57,7 @@ def take_turns(
     contestants: Mapping[Key, Work],
     rounds: int,
     progress: Callable[[float], object] = lambda done: None,
-    clock: Callable[[], float] = perf_counter,
+    clock: Callable[[], float] | None = None,
 ) -> dict[Key, Spread]:
     """Return the seconds of one call of each contestant by a clock, over rounds in which each has a
     turn.
@@ -94,7 +94,8 @@ def warm_up(work: Work, clock: Callable[[], float] | None = None) -> float:
     return least
 
 
-def _turn(work: Work, calls: int, clock: Callable[[], float]) -> float:
+def _turn(work: Work, calls: int, clock: Callable[[], float] | None) -> float:
+    clock = clock or perf_counter
     if calls > 1:
         work()
     begin = clock()
