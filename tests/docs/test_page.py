@@ -1,11 +1,9 @@
 """Blocks of a page, and the comparison of shown with printed output."""
 
-import importlib.util
-
 import pytest
 from kincheck.core.cli import every_command
 
-from ..support.sources import ROOT
+from .builder import module
 from .page import blocks, commands, differences
 
 PAGE = """
@@ -66,13 +64,7 @@ def test_shown_output_may_differ_in_numbers(shown, lacks):
 
 
 def test_reference_pages_list_commands_and_types():
-    source = ROOT / "docs" / "generated.py"
-    if not source.exists():
-        pytest.skip("the documentation is not here")
-    spec = importlib.util.spec_from_file_location("generated_pages", source)
-    generated = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(generated)
-    pages = generated.PAGES()
+    pages = module("generated").PAGES()
     commands_page = pages["reference/command-line.md"]
     assert [name for name in every_command() if f"\n## {name}\n" not in commands_page] == []
     assert "`--missing-is-failure`" in commands_page
