@@ -228,8 +228,8 @@ class RecordedEngine:
             found[name] = Stated(column.head.name, use.sign, offset, unit, size, use.si)
         return found
 
-    def _solve_sweep(self, sweep: Sweep) -> Mapping[str, Series]:
-        return native_outputs(replace(self.resampled.case, sweep=sweep))
+    def _solve_sweep(self, sweep: Sweep, outputs: Sequence[Quantity]) -> Mapping[str, Series]:
+        return native_outputs(replace(self.resampled.case, sweep=sweep, outputs=tuple(outputs)))
 
     @cached_property
     def _native(self) -> Mapping[str, Series]:
@@ -238,7 +238,8 @@ class RecordedEngine:
 
     @cached_property
     def _variants(self) -> list[Mapping[str, Series]]:
-        return [*map(self._solve_sweep, self.resampled.variants)]
+        outputs = self.resampled.case.outputs
+        return [self._solve_sweep(sweep, outputs) for sweep in self.resampled.variants]
 
     def _driver_digits(self, name: str, quantity: str) -> Array:
         """Return the share of the digits of time and drivers in an output of native."""

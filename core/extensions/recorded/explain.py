@@ -34,8 +34,8 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3},
 }
 
-Solve = Callable[[Sweep], Mapping[str, Series]]
-"""Returns the native engine's outputs on a sweep."""
+Solve = Callable[[Sweep, Sequence[Quantity]], Mapping[str, Series]]
+"""Returns these outputs of the native engine on a sweep."""
 
 
 @dataclass(frozen=True)
@@ -200,8 +200,9 @@ class _Change:
         return [float(grid[k]) for k in best[:_TRIED]]
 
     def curves(self, values: Array) -> Mapping[str, Series]:
-        """Return the outputs at other values of the driver."""
-        return self.solve(replace(self.sweep, values=values))
+        """Return the outputs that are off at other values of the driver."""
+        outputs = [each.output for each in self.off]
+        return self.solve(replace(self.sweep, values=values), outputs)
 
     def left(self, curves: Mapping[str, Series], dense: Array, at: Array) -> float:
         """Return the rest of all outputs at values between those of curves, in their ranges."""
