@@ -54,7 +54,7 @@ def in_site(markdown: str, folder: Path, address: str) -> str:
     def link(found: re.Match[str]) -> str:
         path = Path(os.path.normpath(folder / at / found["path"]))
         for home in (KERNEL, *folders()):
-            if home != folder and path.is_relative_to(home):
+            if path.is_relative_to(home):
                 target = Path(os.path.relpath(path.relative_to(home), at)).as_posix()
                 return f"[{found['text']}]({target}{found['anchor'] or ''})"
         return found["text"] if is_absent(path) else found[0]
