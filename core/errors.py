@@ -162,6 +162,11 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
     return f"there is no {what} {name!r}; {remedy(name, known)}"
 
 
+def sentence(text: str) -> str:
+    """Return a text that begins as a sentence does."""
+    return f"{text[:1].upper()}{text[1:]}"
+
+
 def remedy(name: str, known: Iterable[str]) -> str:
     """Return the remedy for an unknown name: the most similar known one, else all of them."""
     names = sorted(known)

@@ -16,7 +16,7 @@ import kincheck
 from kincheck.core.case.io import schema
 from kincheck.core.case.io.catalogue import output_tables, type_tables
 from kincheck.core.cli.main import parser as parser_of
-from kincheck.core.extensions.sweep import variation_schema
+from kincheck.core.doors import offers
 
 ROOT = Path(__file__).parent.parent
 SHARED = {
@@ -92,7 +92,7 @@ def _row(action: argparse.Action) -> tuple[str, str]:
 
 
 def case_file() -> str:
-    """Return the page of the keys of case and variation files, from the modules that read them."""
+    """Return the page of the keys of case files, and of other files that extensions read."""
     parts = [
         "# Case files",
         "A case file describes a mechanism, its motion, its outputs and their reference. This page"
@@ -107,11 +107,13 @@ def case_file() -> str:
     sections, _, loads = cases.partition(
         "Masses and loads of a case file: their keys, and their numbers in SI.\n\n"
     )
-    _, _, variations = (variation_schema.__doc__ or "").partition("Reference. ")
     for title, text in (
         ("All keys", sections),
         ("Masses, gravity and forces", loads),
-        ("Variation files", variations),
+        *(
+            (f"{kind.capitalize()} files", each.load().partition("Reference. ")[2])
+            for kind, each in offers("keys").items()
+        ),
     ):
         prose, _, keys = text.partition("\n\n    ")
         parts += [f"## {title}", " ".join(prose.split()), f"```text\n{_dedented(keys)}\n```"]

@@ -2,8 +2,8 @@
 
 For each name, by default for each extension: a copy of the sources without its folder and its tests
 lists commands and engines, solves a case in native, and imports every module whose extension is
-still there. With --tests it also runs the tests of the kernel and of the other extensions that can
-be collected.
+still there. With --tests it also deletes what needs the extension, and runs the tests that are
+left.
 """
 
 import argparse
@@ -14,10 +14,12 @@ import sys
 import tempfile
 from pathlib import Path
 
+from kincheck.core.doors import extensions
+
 from .support.sources import EXTENSIONS, PACKAGE, ROOT
 
-COPIED = "core", "adapters", "cases", "tests", "docs", ".github"
-FILES = "pyproject.toml", "setup.py", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "Makefile"
+COPIED = "core", "adapters", "cases", "tests", "docs", ".github", ".ci"
+FILES = "*.toml", "*.py", "*.md", "*.in", "*.lock", "*.cff", "Makefile", "Containerfile"
 WORKS = """
 import importlib, pkgutil, sys
 import kincheck
@@ -44,19 +46,30 @@ for command in (["--help"], ["list"], ["run", "mcpherson_strut", "--engine", "na
 
 def copy_without(name: str, folder: Path) -> None:
     """Copy the sources without an extension, laid out as an installation has them."""
-    (extension,) = (each for each in EXTENSIONS if each.name == name)
     for each in COPIED:
         shutil.copytree(
             ROOT / each, folder / each, ignore=shutil.ignore_patterns("__pycache__", ".hypothesis")
         )
-    for each in FILES:
-        shutil.copy(ROOT / each, folder / each)
-    shutil.rmtree(folder / extension)
-    shutil.rmtree(folder / "tests" / "extensions" / name, ignore_errors=True)
+    for file in (file for pattern in FILES for file in ROOT.glob(pattern)):
+        shutil.copy(file, folder)
+    delete(name, folder)
     package = folder / "site" / "kincheck"
     shutil.copytree(folder / PACKAGE, package)
     for each in COPIED[:3]:
         (package / each).symlink_to(folder / each)
+
+
+def delete(name: str, folder: Path) -> None:
+    """Delete an extension and its tests in a copy."""
+    (extension,) = (each for each in EXTENSIONS if each.name == name)
+    shutil.rmtree(folder / extension)
+    shutil.rmtree(folder / "tests" / "extensions" / name, ignore_errors=True)
+
+
+def those_that_need(name: str) -> set[str]:
+    """Return the extensions that are not there without another one."""
+    found = {each.name for each in extensions().values() if name in each.needs}
+    return found.union(*map(those_that_need, found))
 
 
 def main() -> int:
@@ -75,7 +88,9 @@ def main() -> int:
             commands = [[sys.executable, "-c", WORKS, name, *names]]
             if options.tests:
                 commands.append([sys.executable, "-m", "pytest", "--numprocesses", "auto"])
-            for command in commands:
+            for k, command in enumerate(commands):
+                for each in those_that_need(name) if k else ():
+                    delete(each, folder)
                 done = subprocess.run(
                     command, cwd=folder, env=environment, capture_output=True, text=True
                 )

@@ -13,6 +13,7 @@ from markupsafe import Markup
 from msgspec.structs import asdict
 
 from ..case.case import Truth
+from ..errors import sentence
 from ..harness.engine import STANDARD
 from ..harness.labels import (
     TRUTHS,
@@ -63,7 +64,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
             "There is no reference. Engines that agree with the native one may be wrong together.",
         )
     for case, note in notes(results.run):
-        add(f"Note on {case}", f"{note[:1].upper()}{note[1:]}.")
+        add(f"Note on {case}", f"{sentence(note)}.")
     for outcome in Outcome:
         pairs = [_pair(record) for record in records if record.outcome is outcome]
         if pairs and outcome not in ANSWERED:

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ..case.io.escape import visible
-from ..errors import labelled
+from ..errors import labelled, sentence
 from ..harness.labels import (
     account,
     against,
@@ -378,7 +378,7 @@ def to_markdown(results: Results) -> str:
     lost = filter(None, (unmade(results), unread(results.run)))
     lines += [escape_markdown(f"{sentence}.") for sentence in lost]
     told = [labelled(note, case) for case, note in notes(results.run)]
-    lines += [escape_markdown(f"{each[:1].upper()}{each[1:]}.") for each in told]
+    lines += [escape_markdown(f"{sentence(each)}.") for each in told]
     lines += [escape_markdown(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
         escape_markdown(

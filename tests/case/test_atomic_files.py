@@ -59,10 +59,7 @@ def test_pipes_take_several_texts(tmp_path):
 @pytest.mark.skipif(
     not os.path.exists("/dev/full"), reason="there is no device that is always full"
 )
-@pytest.mark.parametrize(
-    "command",
-    ["trace four_bar --length 1", "explain rssr --samples 3", "assemblies rssr --samples 3"],
-)
+@pytest.mark.parametrize("command", ["explain rssr --samples 3", "assemblies rssr --samples 3"])
 def test_full_disk_is_one_message(command, capsys):
     assert main([*command.split(), "--json", "/dev/full"]) == 2
     (line,) = capsys.readouterr().err.splitlines()

@@ -39,7 +39,6 @@ run rssr --timeout 2e9 | argument --timeout: '2e9' is too large. Give 1e+09 at m
 run rssr --out= | argument --out: found an empty name; give one, or leave it out
 run car.csv --reactions | Write a case file, kincheck import TABLE > case.toml, and there
 run --joints rssr --reactions | --reactions: the loops of --joints have no masses
-board --case four_bar nosuch --out no | there is no case 'nosuch'
 kc rssr --travel -60mm:60mm:5 | rssr: no point is the wheel's centre
 export rssr --at -3degg --to mjcf | '-3degg' is not a number with one of the units
 run rssrr | did you mean 'rssr'? Case files end in
@@ -51,8 +50,6 @@ stress --family unit | there is no family 'unit'; did you mean 'units'?
 stress --engine nativ | there is no engine 'nativ'
 stress --samples 0 | '0' is not a whole number of 1 or more
 serve rssr --port abc | --port: 'abc' is not a whole number of 0 or more
-board --out x --steps abc | --steps: 'abc' is not a whole number of 1 or more
-board --out x --timeout abc | --timeout: 'abc' is not a positive number
 run rssr --accuracy 0.02 --signs iso8855
     | --signs, --accuracy: for a measured curve, and there is none; add --reference FILE
 serve rssr --accuracy 0.02 | --accuracy: for a measured curve, and there is none

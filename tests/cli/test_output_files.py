@@ -25,7 +25,6 @@ OPTIONS = [
     (("history", "--history", "kept"), "--plot"),
     (("history", "--history", "kept"), "--export"),
     *((SWEEP, option) for option in ("--json", "--store")),
-    (("trace", "five_bar"), "--json"),
     (("explain", "five_bar"), "--json"),
     (("assemblies", "five_bar"), "--json"),
     (("assemblies", "five_bar", "--export", "mjcf"), "--out"),
@@ -62,7 +61,6 @@ def test_impossible_output_file_is_refused(here, capsys, command, option, name):
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (("trace", "five_bar"), "five_bar: left first growing"),
         (("explain", "five_bar"), "five_bar: "),
         (("assemblies", "five_bar"), "assemblies from"),
     ],
@@ -87,9 +85,9 @@ def test_reference_continues_after_failed_file(here, capsys):
 def test_replaced_file_stays_whole_for_readers(here):
     Path("all.json").write_text("an earlier answer")
     with Path("all.json").open() as old:
-        assert main("trace five_bar --json all.json".split()) == 0
+        assert main("run five_bar --engine native --json all.json".split()) == 0
         assert old.read() == "an earlier answer"
-    assert json.loads(Path("all.json").read_text())["schema"] == "kincheck-trace/1"
+    assert json.loads(Path("all.json").read_text())["schema"].startswith("kincheck-results/")
 
 
 LIMITED = """

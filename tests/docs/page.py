@@ -11,13 +11,8 @@ A number in shown output stands for any number, a line "..." for any lines, and 
 a line for its rest.
 """
 
-import importlib.util
 import re
 from dataclasses import dataclass
-
-import pytest
-
-from ..support.sources import ROOT
 
 LANGUAGES = {
     "sh", "console", "python", "text", "toml", "csv", "xml", "yaml", "ini", "json",
@@ -115,14 +110,3 @@ def _fits(line, found):
 
 def _plain(line):
     return " ".join(NUMBER.sub("#", line).split())
-
-
-def builder(name):
-    """Return a module of docs/, which is no package. Without it, the test is skipped."""
-    source = ROOT / "docs" / f"{name}.py"
-    if not source.exists():
-        pytest.skip("the documentation is not here")
-    spec = importlib.util.spec_from_file_location(f"docs_{name}", source)
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
-    return made

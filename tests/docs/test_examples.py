@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from ..support.sources import ROOT
+from ..support.sources import ROOT, files
 from .page import LANGUAGES, blocks, commands, differences
 
 README = ROOT / "README.md"
-PAGES = sorted((ROOT / "docs").rglob("*.md"))
+PAGES = [ROOT / path for path in files("docs", "core", "adapters", ending="md")]
 SHELL = """
 set -eu -o pipefail
 if [ -e "$SAVED" ]; then . "$SAVED"; fi

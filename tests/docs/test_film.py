@@ -7,12 +7,12 @@ from PIL import Image
 
 from ..support.browser import CHROMIUM
 from ..support.sources import ROOT
-from .page import builder
+from .builder import module
 
 
 @pytest.fixture(scope="module")
 def film():
-    return builder("film")
+    return module("film")
 
 
 def differing(file):

@@ -7,7 +7,8 @@ import pytest
 from kincheck.core.cli import every_command
 
 from ..support.sources import ROOT
-from .page import blocks, builder, commands, differences
+from .builder import module
+from .page import blocks, commands, differences
 
 PAGE = """
 ```toml title="a.toml"
@@ -67,7 +68,7 @@ def test_shown_output_may_differ_in_numbers(shown, lacks):
 
 
 def test_reference_pages_list_commands_and_types():
-    pages = builder("generated").PAGES()
+    pages = module("generated").PAGES()
     commands_page = pages["reference/command-line.md"]
     assert [name for name in every_command() if f"\n## {name}\n" not in commands_page] == []
     assert "`--missing-is-failure`" in commands_page
@@ -84,6 +85,6 @@ def test_site_finds_described_names():
         pytest.skip("the documentation is not here")
     found = re.findall(r"^::: (kincheck\.core(?:\.\w+)*)\.(\w+)$", page.read_text(), re.MULTILINE)
     assert len(found) > 30
-    for module, name in found:
-        where = importlib.import_module(module)
-        assert name in getattr(where, "__all__", vars(where)), f"{module}.{name}"
+    for package, name in found:
+        where = importlib.import_module(package)
+        assert name in getattr(where, "__all__", vars(where)), f"{package}.{name}"

@@ -2,7 +2,6 @@
 lies beyond them.
 """
 
-import json
 import math
 from dataclasses import replace
 from functools import cache
@@ -11,7 +10,6 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import JointAngle, SolveError
-from kincheck.core.cli.main import main
 from kincheck.core.kinematics.continuation.trace import trace
 
 from ..support.by_night import sparse_by_day
@@ -192,19 +190,6 @@ def test_trace_without_singular_poses():
 def test_trace_refuses_bad_arguments(arguments, message):
     with pytest.raises(SolveError, match=message):
         trace(mcpherson(), **({"driver": "stroke"} | arguments))
-
-
-def test_trace_command(tmp_path, capsys):
-    file = tmp_path / "curve.json"
-    assert main(["trace", "mcpherson_strut", "--length", "2.5", "--json", str(file)]) == 0
-    assert "limit point at stroke = -0.316737084 m" in capsys.readouterr().out
-    found = json.loads(file.read_text())
-    assert found["schema"] == "kincheck-trace/1"
-    (event,) = found["curves"][1]["events"]
-    assert event["value"] == pytest.approx(LIMITS[-1], abs=1e-14)
-    assert event["nearest_pose"]["kind"] == "lock-up"
-    assert main(["trace", "mcpherson_strut", "--driver", "strok"]) == 2
-    assert "did you mean 'stroke'" in capsys.readouterr().err
 
 
 # Curves that close: events beside their beginning, the closing step and their length

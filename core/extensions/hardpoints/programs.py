@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...case.io.document import Section, fault, parse, shown
-from ...errors import MOST_NAMED, remedy, shortened
+from ...errors import MOST_NAMED, remedy, sentence, shortened
 from .options import WheelOptions
 from .table import Hardpoint, HardpointTable, number, require_name, twice, wanted_corner
 
@@ -244,8 +244,8 @@ def _row(file: Path, where: str, row: str, columns: tuple[str, ...]) -> tuple[st
         raise fault(
             file,
             where,
-            f"{name}: found symmetry {shown(symmetry)}, expected a side;"
-            f" {remedy(symmetry, (*LEFT, RIGHT))}",
+            f"{name}: found symmetry {shown(symmetry)}, expected a side."
+            f" {sentence(remedy(symmetry, (*LEFT, RIGHT)))}",
         )
     x, y, z = (number(file, f"{where}: {name}: {axis}", cells[axis]) for axis in COLUMNS[2:])
     return name, symmetry, Hardpoint((x, y, z), where)

@@ -21,7 +21,7 @@ from ...case.io.document import fault, parse, shown, unknown_name
 from ...case.io.table import is_number
 from ...case.io.toml_text import parse_yaml
 from ...case.units import LENGTHS
-from ...errors import brief, remedy, shortened
+from ...errors import brief, remedy, sentence, shortened
 from ...mechanism.mechanism import Vector
 from .options import NOTHING, WheelOptions
 from .programs import without_comments
@@ -435,8 +435,8 @@ def _of_one_suspension(
             raise fault(
                 file,
                 "--sheet",
-                f"found no section {shown(wanted)}, expected one with points;"
-                f" {remedy(wanted, known)}",
+                f"found no section {shown(wanted)}, expected one with points."
+                f" {sentence(remedy(wanted, known))}",
             )
         if rest := len(kept) - len(found):
             left_out.append(f"{rest} points of other sections")

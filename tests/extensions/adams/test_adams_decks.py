@@ -64,7 +64,7 @@ def test_rack_through_pinion_axis_is_refused():
         load(DECKS["RackPinion_Case01"])
 
 
-PAGE = Path(__file__).parents[3] / "docs" / "pages" / "how-to" / "decks.md"
+PAGE = Path(__file__).parents[3] / "core/extensions/adams/docs/how-to/decks.md"
 NUMBER = re.compile(r"\d[\d.]*(?:e[-+]\d+)?")
 
 

@@ -473,3 +473,17 @@ def test_unsupported_constraint_is_board_row(tmp_path):
 def test_board_refuses_wrong_options(options, message, tmp_path, capsys):
     assert board(tmp_path, *options.split()) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("--case four_bar nosuch", "there is no case 'nosuch'"),
+        ("--steps abc", "--steps: 'abc' is not a whole number of 1 or more"),
+        ("--timeout abc", "--timeout: 'abc' is not a positive number"),
+    ],
+)
+def test_board_refuses_invalid_options(options, said, tmp_path, capsys):
+    assert board(tmp_path, *options.split()) == 2
+    out, err = capsys.readouterr()
+    assert (out, said in err) == ("", True), err

@@ -8,7 +8,7 @@ from ...docs.page import blocks
 from ...support.sources import ROOT
 
 PLACES = ["joints.tie_rod.points.0 z", "joints.tie_rod.points.1 y"]
-PAGE = ROOT / "docs/pages/how-to/curves.md"
+PAGE = ROOT / "core/extensions/sweep/docs/how-to/curves.md"
 
 
 @pytest.fixture(scope="module")

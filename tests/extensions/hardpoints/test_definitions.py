@@ -5,9 +5,10 @@ import re
 from kincheck.core.case.measures import Measure
 from kincheck.core.extensions.hardpoints.suspension import SuspensionOutput
 
-from ..support.sources import ROOT
+from ...support.sources import ROOT
 
-PAGE = (ROOT / "docs/pages/theory/outputs.md").read_text()
+DOCS = ROOT / "core/extensions/hardpoints/docs"
+PAGE = (DOCS / "theory/outputs.md").read_text()
 
 
 def test_definitions_have_every_output():
@@ -21,4 +22,4 @@ def test_definitions_have_every_output():
 def test_drawings_of_definitions_are_there():
     found = re.findall(r"\]\(\.\./(figures/\w+\.svg)\)", PAGE)
     assert len(found) == 3
-    assert all((ROOT / "docs/pages" / each).is_file() for each in found)
+    assert all((DOCS / each).is_file() for each in found)
