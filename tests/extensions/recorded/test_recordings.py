@@ -105,7 +105,8 @@ def test_adams_results_are_judged_with_rates(judged):
     _, record = judged(DATA / "fourbar.res", "--analysis", "kinematic_001")
     assert largest(record) < 2e-15
     assert largest(record, "velocity") < 1e-14
-    assert largest(record, "acceleration") < 1e-13
+    # a few units in the last place of products of coordinates and squared rates
+    assert largest(record, "acceleration") < 3e-13
     assert "read the analysis kinematic_001" in record["message"]
 
 
