@@ -119,6 +119,7 @@ def test_end_that_cannot_be_installed(offline, capsys):
     assert "--to 4.0: cannot be installed" in capsys.readouterr().err
 
 
+@pytest.mark.nightly
 def test_nobody_is_right_without_truth(offline):
     case(offline, "alone", "consensus_only")
     for release in (1, 2):

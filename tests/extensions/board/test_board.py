@@ -228,6 +228,7 @@ def test_board_site_has_every_row(site, rows):
     assert "://" not in page.replace("http://www.w3.org", "")
 
 
+@pytest.mark.nightly
 def test_board_keeps_row_history(tmp_path, capsys):
     given = ["--engine", "mujoco", "--case", short(tmp_path, 0.02, 3)]
     file = tmp_path / "site" / "board.json"

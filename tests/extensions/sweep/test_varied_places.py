@@ -21,6 +21,7 @@ from kincheck.core.extensions.sweep.variation_file import read_variation
 from kincheck.core.extensions.sweep.varied_places import Geometry
 from kincheck.core.kinematics import placed
 
+from ...support.by_night import sparse_by_day
 from ...support.rods_of_templates import solved
 from ...support.variations import moved, vary, vary_file
 
@@ -88,9 +89,10 @@ CASES = {
 } | {"mcpherson right": ("mcpherson", RIGHT, CORNER)}
 
 
-@pytest.mark.parametrize(("name", "rows", "supplied"), CASES.values(), ids=CASES)
-def test_variant_of_row_equals_moved_table(tmp_path, name, rows, supplied):
+@pytest.mark.parametrize("key", sparse_by_day(CASES, 5))
+def test_variant_of_row_equals_moved_table(tmp_path, key):
     """Every row of every template, moved by a millimetre and more along the axes of the table."""
+    name, rows, supplied = CASES[key]
     move = (1.0, -1.3, 0.7)
     ready = study_of(tmp_path, case_of(table(tmp_path, name, rows), supplied))
     names = [each.name for each in ready.study.variation.coordinates]
@@ -145,8 +147,9 @@ def compared(ready):
     assert not known
 
 
-@pytest.mark.parametrize(("name", "rows", "supplied"), CASES.values(), ids=CASES)
-def test_explain_of_table_equals_gradients(tmp_path, name, rows, supplied):
+@pytest.mark.parametrize("key", sparse_by_day(CASES, 5, 1))
+def test_explain_of_table_equals_gradients(tmp_path, key):
+    name, rows, supplied = CASES[key]
     case = case_of(table(tmp_path, name, rows), supplied)
     assert [each for each in compared(study_of(tmp_path, case)) if each[2] > ACCURATE] == []
 
@@ -154,7 +157,7 @@ def test_explain_of_table_equals_gradients(tmp_path, name, rows, supplied):
 SUSPENSIONS = [name for name in cases.names() if name.startswith(("mcpherson", "chrono"))]
 
 
-@pytest.mark.parametrize("name", SUSPENSIONS)
+@pytest.mark.parametrize("name", sparse_by_day(SUSPENSIONS, 3))
 def test_explain_of_suspension_equals_gradients(tmp_path, name):
     """Positions at one point move together in both, with the markers of the wheel."""
     case = cases.load(name)
