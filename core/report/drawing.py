@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import msgspec
 
 from ..algebra import Vec3, quat, rotation_less_identity, vec
+from ..errors import sentence
 from ..harness.scene_record import Scene, SceneBody, SceneForce, SceneJoint, SceneWheel
 from ..joints.base import unit
 from ..mechanism.mechanism import GROUND
@@ -133,9 +134,7 @@ class _Draughtsman:
             if scene.frames
             else ""
         )
-        self.drawn.caption = solved + (
-            f"{scene.message[0].upper()}{scene.message[1:]}." if scene.message else ""
-        )
+        self.drawn.caption = solved + (f"{sentence(scene.message)}." if scene.message else "")
 
     def add_arrows(self, outputs: Mapping[str, Sequence[float | None]]) -> None:
         """Add one arrow for all components of a joint or driver along global axes, and one for each

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from ..case.case import Truth
+from ..errors import sentence
 from ..harness.engine import RECORDED, STANDARD
 from ..harness.labels import (
     against,
@@ -269,9 +270,7 @@ def _output(
     band = (standard, positions[0].deviation.tolerance) if standard else None
     points = records[0].truth == Truth.THIRD_PARTY_DATA
     given.figures[key] = output_figure(output, axis, curves, truth, band, measured=points)
-    sentences = [
-        f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)
-    ]
+    sentences = [f"{sentence(sense)}." for _, series in curves[:1] if (sense := series.sense)]
     sentences += [] if truth else ["No reference."]
     if band:
         whose = against(positions[0].deviation.against)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...case.case import PER_TRAVEL
-from ...errors import number_of
+from ...errors import number_of, sentence
 from ...harness.labels import output_label
 from ...report.axis import Axis
 from ...report.figures import Figure, OverDriver, Style
@@ -21,7 +21,7 @@ from ...report.report import headline
 from ...report.sections import Diagram, Report, Section, environment, figure_parts
 from ...trajectory import Array
 from ...unit_text import with_unit
-from .rates import SIDES, Curve
+from .rates import SIDES, Curve, without_side
 from .results import COMPLIANCE, WHEEL_LOAD, ComplianceCurves, ComplianceResults
 from .rig import PER
 from .views import agreement, digits, shown_unit, unit_of_axis
@@ -89,7 +89,7 @@ def page(results: ComplianceResults) -> str:
         parts[k] = replace(part, notes=[each for each in part.notes if each not in said])
         said.update(part.notes)
     rows = [
-        (each.label[0].upper() + each.label[1:], *_value(each.value, each.unit), each.says)
+        (sentence(each.label), *_value(each.value, each.unit), each.says)
         for each in results.travel.summary()
     ]
     return (
@@ -203,7 +203,7 @@ def _left(name: str) -> str:
 
 
 def _group(name: str) -> str:
-    own = _left(name).removeprefix(f"{SIDES[1]}_")
+    own = without_side(name)
     return next(title for title, holds in GROUPS.items() if holds(own))
 
 

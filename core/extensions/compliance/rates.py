@@ -20,7 +20,15 @@ import numpy as np
 from ...trajectory import Array
 
 SIDES = ("left", "right")
+
 _ALIKE, _OPPOSITE = np.array([1.0, 1.0]), np.array([1.0, -1.0])
+
+
+def without_side(name: str) -> str:
+    """Return a name of an axle without its side."""
+    for side in SIDES:
+        name = name.removeprefix(f"{side}_")
+    return name
 
 
 @dataclass(frozen=True, eq=False)

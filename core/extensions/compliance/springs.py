@@ -15,7 +15,7 @@ from ...errors import KincheckError
 from ...mechanism.loads import ForceElement, SpringDamper
 from ...mechanism.mechanism import Vector
 from ..hardpoints.suspension import MotionRatio
-from .rates import SIDES
+from .rates import without_side
 from .section import KEY, rig_of
 
 TIRE = "tire"
@@ -68,7 +68,7 @@ def places_of(case: Case) -> dict[str, list[MotionRatio]]:
     found = dict[str, list[MotionRatio]]()
     for output in case.outputs:
         if isinstance(output, MotionRatio):
-            found.setdefault(_without_side(output.name.removesuffix("_ratio")), []).append(output)
+            found.setdefault(without_side(output.name.removesuffix("_ratio")), []).append(output)
     return found
 
 
@@ -80,7 +80,7 @@ def written_names(case: Case) -> dict[str, str]:
     """
     places, found = places_of(case), dict[str, set[str]]()
     for name, ratios in places.items():
-        roles = {_without_side(point) for ratio in ratios for point in ratio.between}
+        roles = {without_side(point) for ratio in ratios for point in ratio.between}
         rows = [
             each.name
             for each in case.hardpoints
@@ -95,12 +95,6 @@ def written_names(case: Case) -> dict[str, str]:
         for written, (name, *others) in found.items()
         if not others and written not in places
     }
-
-
-def _without_side(name: str) -> str:
-    for side in SIDES:
-        name = name.removeprefix(f"{side}_")
-    return name
 
 
 def with_springs(case: Case, springs: Mapping[str, Rate]) -> Case:
