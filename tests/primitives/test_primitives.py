@@ -237,3 +237,21 @@ def test_battery_refuses_unknown_primitive(rng):
     for kind in (New, More):
         with pytest.raises(AssertionError, match="add a maker"):
             make(kind, rng)
+
+
+def test_derivation_tells_short_lived_vectors_apart():
+    """A vector that is made for one turn is gone before the next one is made in its place."""
+    count = 50
+
+    @dataclass(frozen=True)
+    class Sum(Primitive):
+        n = 1
+
+        def phi(self, i, j):
+            turned = [i.turn(Vec3(0.1 * k, 0.3 * k, 0.7 * k)) for k in range(count)]
+            return (sum(a.x * k for k, a in enumerate(turned)),)
+
+    (row,) = Sum().rows(GROUND_POSE, GROUND_POSE)
+    squares = sum(k * k for k in range(count))
+    # e_x . (dpi x a) = dpi . (a x e_x)
+    assert [*row.pi] == pytest.approx([0.0, 0.7 * squares, -0.3 * squares], rel=1e-13)
