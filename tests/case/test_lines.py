@@ -86,7 +86,7 @@ def test_each_key_has_its_line(tree, seed):
 
 @settings(deadline=None, max_examples=25)
 @given(st.dictionaries(NAMES, TREES, min_size=1, max_size=4), st.booleans())
-def test_each_key_of_yaml_has_its_line(tmp_path_factory, tree, flow):
+def test_yaml_key_has_its_line(tmp_path_factory, tree, flow):
     yaml = pytest.importorskip("yaml")
     tree, numbers = numbered(tree)
     file = tmp_path_factory.mktemp("a") / "a.yaml"
@@ -96,7 +96,7 @@ def test_each_key_of_yaml_has_its_line(tmp_path_factory, tree, flow):
         assert str(fault(file, path, "x")) == f"{file}: line {line_with(text, number)}: {path}: x"
 
 
-def test_lost_key_gets_line_of_its_table(tmp_path):
+def test_lost_key_gets_table_line(tmp_path):
     file = write(tmp_path, '[a]\nb = 1\n[joints.pin]\ntype = "x"\n', "a.toml")
     assert str(fault(file, "joints.pin.bodies", "lost")) == (
         f"{file}: line 3: joints.pin.bodies: lost"
@@ -109,7 +109,7 @@ def test_lost_key_gets_line_of_its_table(tmp_path):
 @pytest.mark.parametrize(
     "name", [path.stem for path in sorted((ROOT / "cases").glob("*.toml"))[::7]]
 )
-def test_planted_key_of_case_is_named(tmp_path, name):
+def test_planted_key_is_named(tmp_path, name):
     text = (ROOT / "cases" / f"{name}.toml").read_text()
     heads = [*re.finditer(r"^\[[\w.\"]+\].*\n", text, re.MULTILINE)]
     for head in random.Random(name).sample(heads, min(3, len(heads))):
@@ -133,7 +133,7 @@ BESIDE = {
 
 
 @pytest.mark.parametrize("name", BESIDE)
-def test_file_beside_robot_is_named_with_line(tmp_path, name):
+def test_file_beside_robot_has_line(tmp_path, name):
     if not name.endswith("json"):
         pytest.importorskip("yaml")
     text, _, said = BESIDE[name].partition(" | ")
