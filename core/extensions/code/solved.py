@@ -291,7 +291,7 @@ def solved_case(
         )
     case = replace(case, outputs=measured)
     none = Moves({}, np.empty(0), np.empty((0, 0)))
-    varied, units = moved_by(case, places) if places else (none, {})
+    varied, units = moved_by(case, places) if places else (none, dict[str, str]())
     made = DesignOutputs.of(case, varied.places, derivative=2, bodies=bodies)
     route = made.designs.route
     if route.begin.lead is not None:

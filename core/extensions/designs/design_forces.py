@@ -68,7 +68,7 @@ def forces_of_designs(
     """
     model, traced = route.model, route.model.forces
     # the program decides where all samples are far from singular poses
-    decided, together = _regular(model, found).all(axis=0), None
+    decided, together = np.asarray(_regular(model, found).all(axis=0)), None
     if traced is not None and decided.any():
         kept = found.kept if decided.all() else found.kept[:, :, decided]
         together = traced.of(kept.reshape(len(kept), -1).T)

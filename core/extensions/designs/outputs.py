@@ -207,7 +207,7 @@ class SolvedDesigns:
             e.append(Jet(*known, *[np.nan] * (ORDERS - len(known))))
         with np.errstate(all="ignore"):
             jet = self._completed(name)(e)
-        return derivatives((jet.x, jet.v, jet.a)[order])
+        return np.asarray(derivatives((jet.x, jet.v, jet.a)[order]))
 
     def _terms(self, name: str) -> list[Jet]:
         designs, orders = self.ready.designs, range(self.ready.derivatives[name] + 1)

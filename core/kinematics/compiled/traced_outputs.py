@@ -121,8 +121,9 @@ class TracedOutputs:
                     values = follow([getattr(term, order) for term in terms])
                     tracer.store(out, f"{SLOPE_OF}{OUTPUT}{label} {each.equation.name}", values)
         if forces and forces.slopes:
+            v, a = self._read_rates(())
             count = len(tracer.layout.vectors[CARRIED])
-            carrying = tracer.forces(*self._read_rates(()), tracer.vector(CARRIED, count))
+            carrying = tracer.forces(v, a, tracer.vector(CARRIED, count))
             add(carrying.multipliers, carrying.moved(follow))
             for name, values in carrying.vectors(forces):
                 if name.startswith((REACTION, EFFORT, ELEMENT)):
