@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 from kincheck.adapters import engine
 from kincheck.core import CaseError, KincheckError, PointCoordinate, Supplied
-from kincheck.core.case.measures import Component, JointAngle, JointDisplacement, Orientation
 from kincheck.core.case.models.files import load
-from kincheck.core.case.quantity import with_markers
 from kincheck.core.extensions.hardpoints.suspension import Vehicle
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.extensions.proofs.verified_reference import prove_case
@@ -21,7 +19,6 @@ from kincheck.core.harness.execution import Answer, Pair, attempt
 from kincheck.core.kinematics import placed, places
 
 from ...support.by_night import sparse_by_day
-from ...support.measure_cases import arm
 
 CLOSE = 1e-12
 VEHICLE = {"wheelbase": "2.6", "cg_height": "0.5", "brake_share": "0.6", "rack_per_turn": "0.05"}
@@ -216,39 +213,6 @@ def test_slopes_equal_differences_of_proved_digits(tmp_path, key):
             once = [(4 * fine - coarse) / 3 for coarse, fine in ((a, b), (b, c))]
             expected = float((16 * once[1] - once[0]) / 15)
             assert slope == pytest.approx(expected, rel=1e-11, abs=1e-11), (output, number)
-
-
-ANGLES = (
-    JointAngle("turn_angle", 1e-9, 0.0, "test", joint="hinge"),
-    JointDisplacement("gone", 1e-9, 0.0, "test", joint="bore"),
-    *(
-        Orientation(f"slide_{each}", 1e-9, 0.0, "test", body="slide", component=each)
-        for each in (Component.X, Component.E0, Component.E2)
-    ),
-)
-
-
-def test_slopes_count_turns_and_signs():
-    """Angles of several turns, and Euler parameters that go on through zero: against differences,
-    whose third derivatives leave 1e-9 at this step.
-    """
-    case = arm(np.linspace(0.0, 7.0, 29))
-    case = replace(case, mechanism=with_markers(case.mechanism, ANGLES), outputs=ANGLES)
-    expected = run_alone(case)
-    moved = ["points.B.position x", "joints.hinge.axis y", "joints.bore.axis z"]
-    names = [each.name for each in ANGLES]
-    step = 1e-5
-    ends = kincheck.curves(case, moved, step * np.concatenate([np.eye(3), -np.eye(3)]))
-    found = kincheck.curves(case, moved, np.zeros((1, 3)), slopes=names)
-    assert expected["turn_angle"][-1] == pytest.approx(7.0)
-    assert_equal(found, 0, expected)
-    largest = 0.0
-    for name in names:
-        differences = (ends.values[name][:3] - ends.values[name][3:]) / (2.0 * step)
-        own = found.slopes[name][0].T
-        np.testing.assert_allclose(own, differences, rtol=1e-8, atol=1e-8, err_msg=name)
-        largest = max(largest, np.abs(own).max())
-    assert largest > 0.1
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from kincheck import adapters
 from kincheck.cases import load
 from kincheck.core import SolveError, solve
 from kincheck.core.case.case import Output, without_forces
-from kincheck.core.case.measures import Component, JointAngle, Orientation
+from kincheck.core.case.measures import Component, JointAngle, JointDisplacement, Orientation
 from kincheck.core.case.quantity import where_moving, with_markers
 from kincheck.core.errors import KincheckError
 from kincheck.core.extensions.sweep.statistics import (
@@ -359,7 +359,8 @@ def test_coarse_variants_count_nominal_turns(tmp_path):
 
 
 ATTITUDES = (
-    JointAngle("turned", 1e-9, 0.0, "test", "bore"),
+    JointAngle("turned", 1e-9, 0.0, "test", "hinge"),
+    JointDisplacement("gone", 1e-9, 0.0, "test", "bore"),
     *(
         Orientation(f"slide_{x}", 1e-9, 0.0, "test", "slide", x)
         for x in (Component.Z, Component.E1)
@@ -380,10 +381,13 @@ def differences(study):
 
 
 def turning(folder):
+    """More than a turn of a joint and of a body, whose Euler parameters go on through zero."""
     case = arm(np.linspace(0.0, 7.0, 29))
     case = replace(case, mechanism=with_markers(case.mechanism, ATTITUDES), outputs=ATTITUDES)
-    axis = {"at": "joints.hinge.axis", "sigma": 1.0}
-    return Study(case, vary(folder, case, axis=axis), 1, 0, order=2)
+    axes = {name: {"at": f"joints.{name}.axis", "sigma": 1.0} for name in ("hinge", "bore")}
+    study = Study(case, vary(folder, case, **axes), 1, 0, order=2)
+    assert Ready.of(study).nominal[0, -1] == pytest.approx(7.0)
+    return study
 
 
 def steered(folder):
