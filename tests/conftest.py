@@ -16,6 +16,7 @@ from kincheck.core.cli import main as cli
 from kincheck.core.harness import execution, provenance
 from kincheck.core.harness.provenance import truth_of
 
+from .support import browser
 from .support.fakes import Fake, crank
 
 # For the workers of pytest-xdist, which inherit it: two threads each on two processors wait for
@@ -93,6 +94,25 @@ def cluster(monkeypatch):
         yield found
 
 
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory):
+    """Where one Chromium listens for all tests, each with a page of its own."""
+    if browser.CHROMIUM is None:
+        pytest.skip("chromium is not installed")
+    with browser.chromium(tmp_path_factory.mktemp("chromium")) as host:
+        yield host
+
+
+@pytest.fixture(name="browser")
+def page_of_browser(chromium):
+    """A page in a browser; anything on its console is a failure."""
+    page = browser.Browser(chromium)
+    yield page
+    complaints = page.complaints()
+    page.close()
+    assert complaints == []
+
+
 @pytest.fixture
 def path(tmp_path):
     """The file of a history."""
@@ -113,24 +133,28 @@ def in_folder(monkeypatch):
 
 
 @pytest.fixture
-def kincheck_main(monkeypatch):
-    """main() with the cases and engines of the test; its first argument may hold several words."""
+def kincheck_main():
+    """main() with the cases and engines of the test; its first argument may hold several words.
+
+    These are no code of models: each call has a patch of its own, so that the caches stay.
+    """
 
     def main(*argv, engines=(NATIVE,), cases=None, jobs="0"):
         cases = {"crank": crank(), "crank_two": crank("crank_two")} if cases is None else cases
         by_name = {engine.name: engine for engine in engines}
-        monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
-        monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
-        monkeypatch.setattr(kincheck.adapters, "SIMULATIONS", {})
-        monkeypatch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, NATIVE))
-        monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
-        monkeypatch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
-        about = {name: (truth_of(case), case.source) for name, case in cases.items()}
-        monkeypatch.setattr(kincheck.cases, "summary", about.__getitem__)
-        # in this process, to which fakes with answers of their own belong; isolation has a room of
-        # its own
-        first, *others = argv
-        words = [*first.split(), *map(str, others)]
-        return cli.main([*words, *(["--jobs", jobs] if words[0] == "run" and jobs else [])])
+        with pytest.MonkeyPatch.context() as patch:
+            patch.delenv("KINCHECK_HISTORY", raising=False)
+            patch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
+            patch.setattr(kincheck.adapters, "SIMULATIONS", {})
+            patch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, NATIVE))
+            patch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
+            patch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
+            about = {name: (truth_of(case), case.source) for name, case in cases.items()}
+            patch.setattr(kincheck.cases, "summary", about.__getitem__)
+            # in this process, to which fakes with answers of their own belong; isolation has a room
+            # of its own
+            first, *others = argv
+            words = [*first.split(), *map(str, others)]
+            return cli.main([*words, *(["--jobs", jobs] if words[0] == "run" and jobs else [])])
 
     return main
