@@ -2,7 +2,6 @@
 
 import gc
 import os
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -45,19 +44,35 @@ def pytest_collection_finish():
     gc.freeze()
 
 
-@pytest.fixture(autouse=True)
-def no_recent_models(request):
-    """Empty the caches before and after a test that changes code, so that no other test sees its
-    models.
+class Changes(pytest.MonkeyPatch):
+    """Changes of a test, which empty the caches with changed code and after it, so that no other
+    test sees its models.
 
     Other tests share models: without that the suite takes a tenth more.
     """
-    changes = "monkeypatch" in request.fixturenames
-    if changes:
+
+    is_code = False
+
+    def setattr(self, *given, **more):
+        self.is_code = True
         clear_caches()
-    yield
-    if changes:
+        super().setattr(*given, **more)
+
+    def setenv(self, *given, **more):
+        self.is_code = True  # it can say where machine code is kept
         clear_caches()
+        super().setenv(*given, **more)
+
+    def undo(self):
+        super().undo()
+        if self.is_code:
+            clear_caches()
+
+
+@pytest.fixture
+def monkeypatch():
+    with Changes.context() as patch:
+        yield patch
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -120,16 +135,18 @@ def path(tmp_path):
 
 
 @pytest.fixture
-def own_joint_types(monkeypatch):
+def own_joint_types():
     """Joint types that a test makes are forgotten after it."""
-    monkeypatch.setattr(Joint, "registry", dict(Joint.registry))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Joint, "registry", dict(Joint.registry))
+        yield
 
 
 @pytest.fixture
 def in_folder(monkeypatch):
     """In the folder of the joint types of users, as a user is."""
     monkeypatch.chdir(Path(__file__).parent / "user_joints")
-    monkeypatch.setattr("sys.path", ["", *sys.path])
+    monkeypatch.syspath_prepend("")
 
 
 @pytest.fixture
