@@ -14,7 +14,8 @@ from kincheck.core.case.models.files import load
 from kincheck.core.extensions.hardpoints.rows import MOST_LINES
 from kincheck.core.extensions.trees.reader import read_tree
 from kincheck.core.extensions.trees.tree import MOST_TIES
-from kincheck.core.extensions.xml.element import DEEPEST, MOST_ELEMENTS, parse_xml
+from kincheck.core.extensions.xml import element
+from kincheck.core.extensions.xml.element import DEEPEST, parse_xml
 
 from ..support.case_texts import complains, refused, write
 from ..support.model_files import driven
@@ -125,13 +126,14 @@ def test_table_of_many_lines_is_refused(tmp_path):
     complains(file, f"found {MOST_LINES + 1} lines", Supplied())
 
 
-def test_xml_elements_up_to_limit(tmp_path):
+def test_xml_elements_up_to_limit(tmp_path, monkeypatch):
     """The first one beyond it is named; there is one on each line."""
-    text = "<a>\n" + "<b/>\n" * MOST_ELEMENTS + "</a>"
+    monkeypatch.setattr(element, "MOST_ELEMENTS", most := 100)
+    text = "<a>\n" + "<b/>\n" * most + "</a>"
     file = tmp_path / "model.xml"
-    refused(lambda: parse_xml(file, text), f"line {MOST_ELEMENTS + 1}: <b>: found more than")
+    refused(lambda: parse_xml(file, text), f"line {most + 1}: <b>: found more than")
     fewer = text.replace("<b/>\n", "", 1)
-    assert len(parse_xml(file, fewer).children) == MOST_ELEMENTS - 1
+    assert len(parse_xml(file, fewer).children) == most - 1
 
 
 BODIES = """<mujoco><worldbody><body name="a"><joint name="j"/></body><body name="b"><joint/></body>
