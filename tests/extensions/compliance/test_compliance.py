@@ -193,6 +193,7 @@ def test_axle_wheel_rates_heave_and_roll():
     assert rolled.wheel_load[0] > found.travel.wheel_load[1]  # the bar is twisted
 
 
+@pytest.mark.nightly
 def test_free_axle_compliance_equals_data():
     """Both wheels are free in height; loads and displacements at their centres."""
     rows = AXLE["rows"]
