@@ -354,9 +354,10 @@ def test_slip_names_option_that_states_it(judged, said):
     assert judged(DATA / "fourbar_angles.csv", *RIGHT[:2], "--map", stated)[0] == 0
 
 
-def test_map_offset_has_a_unit(judged):
-    options = ["--map", "MOTION_1=crank-0.8726646259971648 [rad]", *RIGHT[2:]]
-    assert judged(DATA / "fourbar_angles.csv", *options)[0] == 0
+@pytest.mark.parametrize(("offset", "status"), [("0.8726646259971648", 0), ("1e999", 2)])
+def test_map_offset_has_a_unit(judged, offset, status):
+    options = ["--map", f"MOTION_1=crank-{offset} [rad]", *RIGHT[2:]]
+    assert judged(DATA / "fourbar_angles.csv", *options)[0] == status
 
 
 def test_joints_without_poses_are_not_judged(judged):
@@ -415,6 +416,7 @@ def test_accuracy_option_of_recording(judged, table):
     moved = changed_cell(8, 1, more(1e-5))
     file = table("fourbar_xyzw.csv", moved)
     assert judged(file, *maps(XYZW))[0] == 1
+    assert judged(file, *maps(XYZW), "--accuracy", "position=0.005 mm")[0] == 1
     status, record = judged(file, *maps(XYZW), "--accuracy", "position=0.02 mm")
     assert status == 0
     assert record["details"]["rows"]["position"] == pytest.approx(1e-5, rel=1e-3)
