@@ -354,10 +354,9 @@ def test_slip_names_option_that_states_it(judged, said):
     assert judged(DATA / "fourbar_angles.csv", *RIGHT[:2], "--map", stated)[0] == 0
 
 
-@pytest.mark.parametrize(("offset", "status"), [("0.8726646259971648", 0), ("1e999", 2)])
-def test_map_offset_has_a_unit(judged, offset, status):
-    options = ["--map", f"MOTION_1=crank-{offset} [rad]", *RIGHT[2:]]
-    assert judged(DATA / "fourbar_angles.csv", *options)[0] == status
+def test_map_offset_has_a_unit(judged):
+    options = ["--map", "MOTION_1=crank-0.8726646259971648 [rad]", *RIGHT[2:]]
+    assert judged(DATA / "fourbar_angles.csv", *options)[0] == 0
 
 
 def test_joints_without_poses_are_not_judged(judged):
