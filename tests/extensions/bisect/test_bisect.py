@@ -199,10 +199,7 @@ def test_other_copy_of_release_is_found(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("states", ["aaaab", "abbbb", "aabbc", "a-ab-b", "aaaa", "-ab-", "abcde"])
 def test_search_finds_steps(states):
-    seen = []
-
     def state(place):
-        seen.append(place)
         return None if states[place] == "-" else states[place]
 
     steps = [*changes(len(states), state, str.__ne__)]

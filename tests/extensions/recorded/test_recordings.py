@@ -373,8 +373,8 @@ def test_recording_of_driver_alone_is_unjudged(judged, tmp_path):
 
 @pytest.mark.parametrize(
     "rows",
-    [slice(10, 20), slice(1, None, 4), slice(1, 2)],
-    ids=["window", "coarser", "one sample"],
+    [slice(1, None, 4), slice(1, 2)],
+    ids=["coarser", "one sample"],
 )
 def test_recording_of_fewer_samples_passes(judged, table, rows):
     file = table("fourbar_xyzw.csv", lambda every: [every[0], *every[rows]])
