@@ -182,38 +182,31 @@ def at_design(lanes):
 
 def test_walk_follows_as_attempts_do():
     count, request = 2 * LANES + 5, Request(("turn",), ("end",))
-    walking, trying = (ComponentLanes(chain(3), request) for _ in range(2))
-    for lanes in (walking, trying):
+    walking, trying = both = [ComponentLanes(chain(3), request) for _ in range(2)]
+    for lanes in both:
         at_design(lanes)
-    times = np.linspace(0.005, 0.3, count)
-    padded = np.append(times, [0.3] * LANES)
-    motions, tests = walking.walk(walking.sample_tables(padded, PATH), count)
-    assert tests.shape[1] == count
-    for first in range(0, count, LANES):
-        some = slice(first, min(first + LANES, count))
-        tried = len(times[some])
-        assert (trying.attempt(times[some], PATH) > 0.0).all()
-        np.testing.assert_array_equal(motions[:, some], trying.motions(tried))
-        np.testing.assert_array_equal(tests[:, some], trying.worst[:, :tried])
-        trying.carry(tried - 1)
-    ends = [lanes.anchor(0.3).pose for lanes in (walking, trying)]
+    times = np.append(np.linspace(0.005, 0.3, count), [0.3] * LANES)
+    walked = walking.walk(walking.sample_tables(times, PATH), count)
+    for some in np.split(np.arange(count), [LANES, 2 * LANES]):
+        n = len(trying.attempt(times[some], PATH))
+        for each, tried in zip(walked, (trying.motions(n), trying.worst[:, :n]), strict=True):
+            np.testing.assert_array_equal(each[:, some], tried)
+        trying.carry(n - 1)
+    ends = [lanes.anchor(0.3).pose for lanes in both]
     for a, b in zip(*ends, strict=True):
         np.testing.assert_array_equal(a, b)
-    model = walking.kinds[0].model
-    time = [*model.plan.fixed].index(model.slots[FROM + TIME])
-    assert ends[0][0][0, time] == pytest.approx(0.3)
+    assert ends[0][0][0, walking.kinds[0].column[FROM + TIME]] == pytest.approx(0.3)
 
 
 def test_walk_stops_before_doubtful_samples():
     lanes = ComponentLanes(chain(3), Request(("turn",), ("end",)))
-    times = np.linspace(0.005, 0.3, LANES)
-    tables = lanes.sample_tables(np.append(times, [0.3] * LANES), PATH)
-    # the first residual is below both; rounding leaves more than the second in doubt
+    times = np.full(2 * LANES, 0.005)
+    # the residual is below both; rounding leaves more than the second in doubt
     for tol, followed in ((1e-12, LANES), (2e-18, 0)):
         at_design(lanes)
         lanes.accept_by({"tolerance": tol})
-        assert lanes.attempt(times, PATH)[0] > 0.0
-        assert lanes.walk(tables, LANES)[1].shape[1] == followed
+        assert lanes.attempt(times[:1], PATH) > 0.0
+        assert lanes.walk(lanes.sample_tables(times, PATH), LANES)[1].shape[1] == followed
 
 
 @pytest.mark.parametrize(
