@@ -17,7 +17,7 @@ from ...joints import Kind
 from ...mechanism.motions import PointCoordinate
 from ...trajectory import Array
 from ..designs.outputs import DesignOutputs
-from ..sweep.varied_places import Geometry, Variable
+from ..sweep.varied_places import Geometry, Moves, Variable
 from .conditioning import Conditioning, PoseConditioning
 
 # The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for
@@ -114,18 +114,17 @@ def sensitivities(case: Case, found: Conditioning, geometry: Geometry) -> list[S
         for each in geometry.variables
         for name in each.numbers
     ]
-    moves = geometry.moves(geometry.variables)
-    moved = [name for name in moves if np.abs(moves[name]).any()]
-    names = [each.name for each in case.outputs if not each.forces]
-    if not moved or not names:
+    every = geometry.moves(geometry.variables)
+    moved = {place: each for place, each in every.items() if each.any()}
+    wanted = {each.name: 1 for each in case.outputs if not each.forces}
+    if not moved or not wanted:
         return []
-    held = _shifted_drivers(case, moves)
-    ready = DesignOutputs.of(without_forces(case), moved, slopes=names, derivative=int(bool(held)))
-    nominal = np.concatenate([geometry.values[name] for name in moved])[:, None]
+    held, moves = _shifted_drivers(case, moved), Moves.of(geometry.values, moved)
+    ready = DesignOutputs.of(without_forces(case), moved, slopes=wanted, derivative=int(bool(held)))
     samples = [pose.sample for pose in found.poses]
     result: list[Sensitivity] = []
-    solved = ready.solve(nominal)
-    for name, slopes in solved.slopes(np.concatenate([moves[each] for each in moved])):
+    solved = ready.solve(moves.nominal[:, None])
+    for name, _, slopes in solved.slopes(moves.moves):
         own: list[Sensitivity] = []
         slopes = slopes[:, samples, 0]
         for driver, shift in held.items():
