@@ -30,7 +30,7 @@ from ...kinematics.compiled.request import (
 )
 from ...kinematics.compiled.solution import Columns
 from ...kinematics.continuation.singular_poses import SOUND, Anchor, Numbers
-from ...kinematics.formulation.acceptance_criteria import certain_limits
+from ...kinematics.formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
 from ...kinematics.formulation.constraints import frames, structure
 from ...kinematics.formulation.state_vectors import samples
 from ...kinematics.structure.components import Alike, components, describe_components
@@ -310,7 +310,9 @@ class ComponentLanes(Lanes):
         if self._walk is None:
             return super().walk(tables, count)
         samples = [tables[k] for k in self._which]
-        moving, tests = self._walk(samples, count, certain_limits(self._tol))
+        # `is_uncertain` in reverse; for sure, not by rounding either
+        bound = (1.0 - 1e-12) * AMPLIFIED * self._tol / WORSE
+        moving, tests = self._walk(samples, count, (EPSILON, bound))
         return self._motions(moving), tests
 
     def motions(self, count: int) -> Array:

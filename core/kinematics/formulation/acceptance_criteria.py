@@ -99,13 +99,6 @@ def is_uncertain(
     return (WORSE * closure > limit) | (limit < WORSE * EPSILON)
 
 
-def certain_limits(tol: float) -> tuple[float, float]:
-    """Return the least residual that counts, and the bound of residuals by the square of sigma, up
-    to which a sample is not uncertain, for sure: not by rounding either.
-    """
-    return EPSILON, (1.0 - 1e-12) * AMPLIFIED * tol / WORSE
-
-
 def needs_check(
     sigma: float | Array, closure: float | Array, tol: float, largest: float | None
 ) -> bool | NDArray[np.bool_]:
