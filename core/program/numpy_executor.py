@@ -281,20 +281,19 @@ class NumpyExecutor:
         none; and the number of groups. Each lane is attempted alone.
         """
         plan, block = self.plan, self.block
-        solved, given = (
-            np.array(plan.fixed_from(each), np.intp).reshape(-1, 2).T
-            for each in (plan.kept, plan.sampled)
-        )
+        solved, given = map(plan.fixed_from, (plan.kept, plan.sampled))
 
         def call(lane: int, groups: int) -> None:
             for member, sources in zip(parts.members.tolist(), parts.taken, strict=True):
                 row, own = parts.base + member * len(plan.kept), parts.fixed[member]
                 if lane >= 0:
-                    own[solved[1]] = parts.world[row + solved[0], lane]
-                    own[given[1]] = parts.samples[given[0], lane]
+                    for k, to in solved:
+                        own[to] = parts.world[row + k, lane]
+                    for k, to in given:
+                        own[to] = parts.samples[k, lane]
                 if not groups:
                     continue
-                block[list(plan.fixed)] = parts.fixed[member, :, None]
+                block[list(plan.fixed)] = own[:, None]
                 block[list(plan.sampled)] = parts.samples
                 block[list(plan.taken)] = parts.world[sources]
                 self.attempt()
