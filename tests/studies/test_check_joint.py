@@ -51,7 +51,7 @@ WITHOUT_EQUIVALENT = ("bowl", "point_on_parabola", "line_no_twist", "torus")
 pytestmark = pytest.mark.usefixtures("own_joint_types")
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize("name", sparse_by_day(BUILT_IN, 3))
 def test_check_joint_passes_builtin_joints(few, name):
     report = check_joint(Joint.registry[name], samples=8)
     assert report.passed, report
