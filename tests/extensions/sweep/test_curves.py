@@ -16,6 +16,7 @@ from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_tabl
 from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.extensions.sweep.varied_places import Geometry
 from kincheck.core.harness.execution import Answer, Pair, attempt
+from kincheck.core.joints import Kind
 from kincheck.core.kinematics import placed, places
 
 from ...support.by_night import sparse_by_day
@@ -189,8 +190,9 @@ def test_slopes_equal_differences_of_proved_digits(tmp_path, key):
     how |= {**VEHICLE, "swing_arms": True}
     case = load(table(tmp_path, name), Supplied(travel="0.03:3", **how))
     case = asymmetric(case) if axle else case
-    variables = [each for each in Geometry(case).variables if each.moves]
-    variables = [each for each in variables if not axle or each.name.startswith("joints.left")]
+    geometry, left = Geometry(case), "joints.left" if axle else ""
+    points = [each for each in geometry.variables if each.moves and each.kind is Kind.POSITION]
+    variables = [each for each in points if each.name.startswith(left)]
     variable = variables[len(name) % len(variables)]
     number, axis = variable.numbers[-1], len(variable.numbers) - 1
     known = places(case.mechanism)
