@@ -301,7 +301,7 @@ class Ready:
             index,
             count,
             summary_of(values, first),
-            (values[:, :, chosen],) if chosen.any() else (),
+            (values if chosen.all() else values[:, :, chosen],) if chosen.any() else (),
             {
                 k: values[:, :, k - first].copy()
                 for k in study.picked.intersection(range(first, first + count))
