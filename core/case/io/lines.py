@@ -7,12 +7,11 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
 # A message is made in a second.
-LONGEST, LONGEST_YAML, MOST_KEYS = 4_000_000, 500_000, 500_000
+LONGEST, LONGEST_YAML = 4_000_000, 500_000
 # Tables of a case are three levels deep, rows of numbers two more. Deeper nesting only obscures a
 # message.
 DEEPEST = 16
@@ -54,7 +53,7 @@ def line_of(key: str, keys: Iterable[tuple[str, int]]) -> int:
     it; 0 if there is none.
     """
     inside, closest, around = 0, "", 0
-    for path, line in islice(keys, MOST_KEYS):
+    for path, line in keys:
         if path == key:
             return line
         if not inside and _within(path, key):
