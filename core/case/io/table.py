@@ -18,6 +18,7 @@ import zlib
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeAlias
 from unicodedata import combining, normalize
@@ -421,6 +422,7 @@ def _cell(value: Any) -> Cell:
     return str(getattr(value, "text", value)).strip()
 
 
+@lru_cache(1024)  # a recording asks again for each output
 def read_unit(text: str) -> tuple[Unit, _Powers] | None:
     """Return the unit of a text, and its powers of length, angle, time and force; None for an
     unknown unit.
