@@ -75,6 +75,13 @@ def monkeypatch():
         yield patch
 
 
+@pytest.fixture
+def patch():
+    """Changes that are no code of models: the caches stay."""
+    with pytest.MonkeyPatch.context() as patch:
+        yield patch
+
+
 @pytest.fixture(autouse=True, scope="session")
 def known_circumstances():
     """Replace the measured speed of the machine by a constant, and read the state of the repository
@@ -135,11 +142,9 @@ def path(tmp_path):
 
 
 @pytest.fixture
-def own_joint_types():
+def own_joint_types(patch):
     """Joint types that a test makes are forgotten after it."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Joint, "registry", dict(Joint.registry))
-        yield
+    patch.setattr(Joint, "registry", dict(Joint.registry))
 
 
 @pytest.fixture

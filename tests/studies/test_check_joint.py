@@ -58,7 +58,7 @@ def test_check_joint_passes_builtin_joints(few, name):
     assert len({each.check for each in report.findings}) == len(report.findings)
 
 
-@pytest.mark.parametrize("module", USERS)
+@pytest.mark.parametrize("module", sparse_by_day(USERS, 2))
 def test_check_joint_passes_user_joints(few, in_folder, module):
     engines = [adapters.engine(name) for name in adapters.ENGINES]
     report = check_joint(load_joint(f"{module}:{USERS[module]}"), samples=8, engines=engines)

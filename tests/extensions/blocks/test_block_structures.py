@@ -178,7 +178,7 @@ def test_bennett_loop_has_one_verdict():
 
 
 @pytest.mark.parametrize(
-    "shape", sparse_by_day(product([(0.0, 9), (1e-6, 5), (1e-4, 5)], ["distance", "hinges"]), 3)
+    "shape", sparse_by_day(product([(0.0, 9), (1e-6, 5), (1e-4, 5)], ["distance", "hinges"]), 6, 3)
 )
 def test_parallelogram_in_ring_has_one_verdict(shape):
     (off, reached), ends = shape
