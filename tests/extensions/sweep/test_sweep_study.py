@@ -29,7 +29,6 @@ from kincheck.core.extensions.sweep.tables import print_sweep, without_gradients
 from kincheck.core.extensions.sweep.variation import DRAWN, Law, Limit
 from kincheck.core.harness.compare import output_series
 from kincheck.core.jet import Jet
-from kincheck.core.kinematics.compiled import traced_forces
 from scipy import stats
 
 from ...support.fakes import crank, exact, swept
@@ -423,7 +422,8 @@ def test_untraced_forces_have_no_gradients(tmp_path, monkeypatch):
     """As of rows that are redundant but for digits: the values are there, and the table says why
     their gradients are not.
     """
-    monkeypatch.setattr(traced_forces, "can_trace", lambda mechanism: False)
+    tracing = "kincheck.core.kinematics.compiled.traced_forces"
+    monkeypatch.setattr(f"{tracing}.can_trace", lambda mechanism: False)
     study = redundant(tmp_path)
     case = replace(study.case, outputs=tuple(each for each in study.case.outputs if each.forces))
     assert np.isnan(gradients(replace(study, case=case, order=0)).along).all()
