@@ -32,8 +32,8 @@ from ...core.joints.base import unit
 from ...core.mechanism.mechanism import Vector
 from ...core.mechanism.motions import PointCoordinate
 from ...core.trajectory import Array
+from ..shared.axis_angles import Parameters, euler_angles, orientation
 from ..shared.force_solution import RowWrench
-from ..shared.poses import Parameters, euler_angles, orientation
 from ..shared.projection_engine import Call, CountedCalls
 from ..shared.tree_forces import NO_MASS, Mass, mass_properties
 from ..shared.tree_model import LEAST, TreeEngine, TreeModel

@@ -6,7 +6,6 @@ Solve:
 
     solve              one design over a sweep
     forces_of          reactions of joints and efforts of drivers of a solved motion
-    trace              a motion by its arc length, beyond lock-ups of a driver
     angle_with_turns   the angle of a joint, followed from the design
     attitude_with_turns
                        the attitude of a body, followed from the design
@@ -42,7 +41,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .compiled.request import LAST_ITERATION, WantedOutput
     from .compiled.routes import Start, notes_on_start, solve_from_start, start_of
-    from .continuation.trace import Curve, Event, trace
     from .followed import (
         DOUBTFUL,
         agreement,
@@ -73,7 +71,6 @@ if TYPE_CHECKING:
 _NAMES = {
     "compiled.request": "LAST_ITERATION WantedOutput",
     "compiled.routes": "Start notes_on_start solve_from_start start_of",
-    "continuation.trace": "Curve Event trace",
     "followed": (
         "DOUBTFUL agreement angle_with_turns attitude_with_turns follower in_doubt near_design"
     ),

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import JointAngle, SolveError
-from kincheck.core.kinematics.continuation.trace import trace
+from kincheck.core.extensions.trace.curve import trace
 
-from ..support.by_night import sparse_by_day
-from ..support.mechanisms import (
+from ...support.by_night import sparse_by_day
+from ...support.mechanisms import (
     A0,
     B0,
     C0,
