@@ -46,6 +46,8 @@ class Extension:
             "native" and "projection"; see `harness.engine.Balancing`.
         simulations: function without arguments for each engine in simulate mode.
         readers: readers of files; see `case.io.readers.Reader`.
+        references: function for the case with a file of `--reference` as its reference, and notes;
+            see `cli.shared_options.with_references`.
         compilers: compiler of plans to machine code; see `program.executor.Compiler`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
@@ -59,6 +61,8 @@ class Extension:
         proposals: function for the least moves of places that bring outputs of a case into bands;
             see `live.table`.
         styles: formulation of a mechanism in each row style; see `kinematics.formulation.styles`.
+        suspicions: function for the suspicion of a case's reference, or of native, by the records;
+            see `harness.provenance.Suspicion`.
         steppers: script of each stepper of free motion; see `adapters.steppers.scripts`.
     """
 
@@ -73,6 +77,7 @@ class Extension:
     equilibria: _Table = field(default_factory=dict[str, str])
     simulations: _Table = field(default_factory=dict[str, str])
     readers: _Table = field(default_factory=dict[str, str])
+    references: _Table = field(default_factory=dict[str, str])
     compilers: _Table = field(default_factory=dict[str, str])
     methods: _Table = field(default_factory=dict[str, str])
     sections: _Table = field(default_factory=dict[str, str])
@@ -85,6 +90,7 @@ class Extension:
     views: _Table = field(default_factory=dict[str, str])
     proposals: _Table = field(default_factory=dict[str, str])
     styles: _Table = field(default_factory=dict[str, str])
+    suspicions: _Table = field(default_factory=dict[str, str])
     steppers: _Table = field(default_factory=dict[str, str])
 
     @property

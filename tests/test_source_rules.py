@@ -15,7 +15,7 @@ SIMULATORS = {"mujoco", "pinocchio", "exudyn", "opensim", "pydrake", "dartpy"}
 
 NUMERICS = {
     *("assemblies", "blocks", "code", "designs", "explain", "free", "laboratory", "llvm", "proofs"),
-    *("residuals", "statics"),
+    *("residuals", "statics", "trace"),
 }
 """Extensions that walk or prove the equations in another way, and see the inside of kinematics."""
 
