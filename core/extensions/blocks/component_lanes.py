@@ -31,15 +31,16 @@ from ...kinematics.compiled.request import (
 from ...kinematics.compiled.solution import Columns
 from ...kinematics.continuation.singular_poses import SOUND, Anchor, Numbers
 from ...kinematics.formulation.acceptance_criteria import is_uncertain
-from ...kinematics.formulation.constraints import frames, structure
+from ...kinematics.formulation.constraints import frames
 from ...kinematics.formulation.state_vectors import samples
-from ...kinematics.structure.components import Alike, components, describe_components
 from ...kinematics.structure.degrees_of_freedom import freedom_account
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import Parts, Plan
 from ...trajectory import QUANTITIES, Array
 from ..llvm.plan import aligned
+from .components import Alike, components, describe_components
+from .numbers_of import structure
 from .sparse_lanes import SparseLanes
 from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 

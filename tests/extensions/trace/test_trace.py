@@ -12,6 +12,7 @@ from kincheck import cases
 from kincheck.core import JointAngle, SolveError
 from kincheck.core.extensions.trace.curve import trace
 
+from ...kinematics.test_singular import LIMITS
 from ...support.by_night import sparse_by_day
 from ...support.mechanisms import (
     A0,
@@ -30,12 +31,6 @@ from ...support.mechanisms import (
     pushed,
     slider_crank,
 )
-
-# The strut's limits of travel [m] to 18 digits, by other means than the package's: the six numbers
-# of the knuckle's pose in 40 digits close two rods, the arm's axis and the strut's line (as in
-# strut_oracle.py), and a secant rule makes the stroke stationary.
-LIMITS = {1: 0.293337313746648221, -1: -0.316737084187394147}
-
 
 # Limit points
 
