@@ -48,6 +48,8 @@ class Extension:
         readers: readers of files; see `case.io.readers.Reader`.
         references: function for the case with a file of `--reference` as its reference, and notes;
             see `cli.shared_options.with_references`.
+        closings: function for a case without rows that are redundant within a tolerance;
+            see `case.io.case_file`.
         compilers: compiler of plans to machine code; see `program.executor.Compiler`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
@@ -78,6 +80,7 @@ class Extension:
     simulations: _Table = field(default_factory=dict[str, str])
     readers: _Table = field(default_factory=dict[str, str])
     references: _Table = field(default_factory=dict[str, str])
+    closings: _Table = field(default_factory=dict[str, str])
     compilers: _Table = field(default_factory=dict[str, str])
     methods: _Table = field(default_factory=dict[str, str])
     sections: _Table = field(default_factory=dict[str, str])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...case.case import Case, Truth
-from ...case.closing import within_digits
 from ...case.io.document import explained, fault
 from ...case.io.outputs import with_all_motions
 from ...case.io.readers import LEFT_OUT, WITHOUT
@@ -13,6 +12,7 @@ from ...errors import shortened
 from ...kinematics import degrees_of_freedom
 from ...mechanism.body import Body
 from ...mechanism.mechanism import Mechanism, Point, Vector
+from ..closing.digits import within_digits
 from ..trees.options import DrivingOptions
 from .constraints import (
     ADDED_UP,

@@ -14,7 +14,6 @@ import numpy as np
 
 from ...algebra import X, Y, vec
 from ...case.case import Case, Sweep, Truth
-from ...case.closing import within_digits
 from ...case.io.document import SMALLEST, explained, usable
 from ...case.io.outputs import with_all_motions
 from ...case.io.readers import LEFT_OUT
@@ -31,11 +30,13 @@ from ...joints import (
     Translational,
     linear_relation,
 )
-from ...kinematics import degrees_of_freedom, reduce_rows
+from ...kinematics import degrees_of_freedom
 from ...mechanism.body import Body, Inertia, checked_inertia
 from ...mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism, Point
 from ...mechanism.motions import Absolute, Driver, JointAngle, JointDisplacement, Motion, Table
+from ..closing.digits import within_digits
+from ..closing.reduction import reduce_rows
 from ..xml.element import Names
 from .assembly import Assembled, assemble
 from .driving import (

@@ -12,6 +12,7 @@ from kincheck import cases
 from kincheck.core import JointAngle, SolveError
 from kincheck.core.extensions.trace.curve import trace
 
+from ...kinematics.test_redundancy import locomotive
 from ...kinematics.test_singular import LIMITS
 from ...support.by_night import sparse_by_day
 from ...support.mechanisms import (
@@ -295,3 +296,10 @@ def test_open_curve_of_many_bodies():
     curve = trace(chain(5), "turn", length=0.4)
     assert not curve.closed
     assert curve.arc[-1] == pytest.approx(0.4)
+
+
+def test_trace_past_dead_rods():
+    """One rod in its dead point is no branch point, for the other one holds; two are."""
+    assert trace(locomotive(np.pi / 2.0), "turn", length=7.0, longest=0.1).events == ()
+    curve = trace(locomotive(np.pi), "turn", length=3.5, longest=0.1)
+    assert curve.events[0].kind == "branch point"
