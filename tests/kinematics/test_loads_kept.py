@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.adapters.shared.equivalents import in_own_frame, own_frame, with_joints_alone
+from kincheck.adapters.shared.equivalents import in_own_frame, own_frame
+from kincheck.adapters.simulate.simulation import with_joints_alone
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.extensions.laboratory.stress.reduction import reduce_case, round_geometry

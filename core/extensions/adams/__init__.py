@@ -3,5 +3,5 @@
 from ...doors import Extension
 
 EXTENSION = Extension(
-    __name__, needs=["closing", "explain", "trees"], readers={"dataset": "reader:DATASET"}
+    __name__, needs=["closing", "explain", "trees", "xml"], readers={"dataset": "reader:DATASET"}
 )

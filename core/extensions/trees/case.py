@@ -15,7 +15,6 @@ import numpy as np
 from ...algebra import X, Y, vec
 from ...case.case import Case, Sweep, Truth
 from ...case.io.document import SMALLEST, explained, usable
-from ...case.io.outputs import with_all_motions
 from ...case.io.readers import LEFT_OUT
 from ...errors import WARNING, CaseError, MechanismError, shortened
 from ...joints import (
@@ -51,6 +50,7 @@ from .driving import (
 )
 from .gluing import glue
 from .options import ModelOptions
+from .outputs import with_all_motions
 from .place import Place, coordinates, rotation_vector
 from .spins import Spin, find_spins
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, sum_of_masses
