@@ -326,7 +326,7 @@ def _require_moved(
 
 
 def _motion(mechanism: Mechanism, name: str, section: Section) -> Motion:
-    cls = section.class_of("motion", Motion.registry)
+    cls = section.class_of("motion", Motion.types())
     driver = _unit(mechanism.driver(name), section.units)
     motion = _build(section, cls, driver=driver)
     design = mechanism.design_value(name)

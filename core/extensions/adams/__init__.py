@@ -3,5 +3,7 @@
 from ...doors import Extension
 
 EXTENSION = Extension(
-    __name__, needs=["closing", "explain", "trees", "xml"], readers={"dataset": "reader:DATASET"}
+    __name__,
+    needs=["closing", "explain", "formulas", "trees", "xml"],
+    readers={"dataset": "reader:DATASET"},
 )

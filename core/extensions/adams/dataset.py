@@ -15,7 +15,7 @@ from typing import cast
 
 from ...case.io.document import fault, shown, unknown_name, usable
 from ...errors import CaseError, remedy
-from ...mechanism.formula import number
+from ..formulas.formula import number
 from ..xml.ledger import Asked
 
 ARGUMENTS: Mapping[str, str] = {
