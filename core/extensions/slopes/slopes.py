@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from .algebra import Scalar, Vec3, power
-from .trajectory import Array
+from ...algebra import Scalar, Vec3, power
+from ...trajectory import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,60 @@
+"""YAML read as tables, without references."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ...case.io.document import check_values, fault, shown
+
+INSTALL = "pip install 'kincheck[yaml]'"
+
+
+# The parser takes seconds for a megabyte; geometry and lists of joints are some kilobytes.
+LONGEST = 500_000
+
+
+def parse_yaml(file: Path, text: str) -> Any:
+    """Return the data of a YAML text.
+
+    Raises:
+        CaseError: PyYAML is missing, or the text is not valid or too long.
+    """
+    try:
+        import yaml
+    except ImportError:
+        raise fault(
+            file, "", f"needs PyYAML, which is not installed; {INSTALL}, or move the file away"
+        ) from None
+    if len(text) > LONGEST:
+        raise fault(
+            file,
+            "",
+            f"found {len(text)} characters, expected {LONGEST} at most; take out what is not"
+            " geometry",
+        )
+
+    class Plain(yaml.BaseLoader):
+        """Makes texts of all scalars, and refuses references, which can multiply without end."""
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):  # pyright: ignore[reportUnknownMemberType]
+                raise yaml.YAMLError("found a reference (*NAME), expected none")
+            return super().compose_node(parent, index)
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+            keys = [key.value for key, _ in node.value if isinstance(key.value, str)]
+            if len(set(keys)) < len(keys):
+                twice = next(key for k, key in enumerate(keys) if key in keys[:k])
+                raise yaml.YAMLError(f"the key {shown(twice)} is given twice")
+            return super().construct_mapping(node, deep)
+
+    try:
+        data: Any = yaml.load(text, Plain)
+        check_values(file, {"content": data})
+        return data
+    except RecursionError:
+        what = "nested too deeply"
+    except (yaml.YAMLError, ValueError) as error:
+        what = " ".join(str(error).split())
+    raise fault(file, "", f"not valid YAML: {what}; correct the syntax") from None
