@@ -60,7 +60,7 @@ class Extension:
         codes: function for the files of a solved case in a language, by their names.
         formats: who reads each format, for the help.
         converters: function from a model's file to the text saved by a simulator.
-        views: HTML of a result or a mechanism in a notebook.
+        views: further forms of a result, and of a mechanism in a notebook; see `tabular`.
         proposals: function for the least moves of places that bring outputs of a case into bands;
             see `live.table`.
         styles: formulation of a mechanism in each row style; see `kinematics.formulation.styles`.

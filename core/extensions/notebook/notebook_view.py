@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...dataset import Dataset
 from ...report.figures import COLOURS
 from ...unit_text import with_unit
+from .tables import columns_of, curves_of, table_of
 
 MOST_ROWS, MOST_COLUMNS, MOST_LINES, MOST_DIAGRAMS = 10, 10, 24, 9
 """Rows and columns of a table, lines of a diagram, and diagrams; the rest is left out, and said."""
@@ -44,7 +45,7 @@ def to_html(title: str, data: Dataset) -> str:
 
 
 def _table(data: Dataset) -> str:
-    columns, units = data.table(), {name: each.unit for name, each in data.columns().items()}
+    columns, units = table_of(data), {name: each.unit for name, each in columns_of(data).items()}
     count = len(next(iter(columns.values()), ()))
     half = MOST_ROWS // 2
     rows = [*range(count)] if count <= MOST_ROWS else [*range(half), *range(count - half, count)]
@@ -70,7 +71,7 @@ def _number(value: Any) -> str:
 def _diagrams(data: Dataset) -> Iterator[str]:
     """Yield a diagram for each variable with curves."""
     across = data.coords[data.x]
-    curves = data.curves()
+    curves = curves_of(data)
     shown = data.shown or [*curves][:MOST_DIAGRAMS]
     for name in shown:
         columns = curves[name]
