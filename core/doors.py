@@ -51,6 +51,7 @@ class Extension:
         closings: function for a case without rows that are redundant within a tolerance;
             see `case.io.case_file`.
         motions: type of a driver's motion in case files; see `mechanism.motions.Motion`.
+        floors: function for the time of a simulator's compiled code alone, by an engine and a case.
         compilers: compiler of plans to machine code; see `program.executor.Compiler`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
@@ -83,6 +84,7 @@ class Extension:
     references: _Table = field(default_factory=dict[str, str])
     closings: _Table = field(default_factory=dict[str, str])
     motions: _Table = field(default_factory=dict[str, str])
+    floors: _Table = field(default_factory=dict[str, str])
     compilers: _Table = field(default_factory=dict[str, str])
     methods: _Table = field(default_factory=dict[str, str])
     sections: _Table = field(default_factory=dict[str, str])

@@ -269,9 +269,6 @@ class Simulation:
         """Return a message on the joint or driver that is not supported here, or None."""
         return self.projection().unsupported(case)
 
-    def floor(self, case: Case) -> None:
-        """Return None: the bound on steps in Python is that of projection."""
-
     def solve(self, model: Any, case: Case, tol: float) -> Trajectory:
         """Simulate all reachable samples with the simulator's own tolerance (see `settings`),
         however far the constraints drift.
