@@ -31,7 +31,7 @@ from ...joints.base import triad
 from ...kinematics.formulation.cartesian import COLUMNS, Cartesian
 from ...kinematics.formulation.constraints import Frames, frames, unit_near
 from ...kinematics.formulation.state_vectors import jacobian
-from ...kinematics.structure.redundancy import RANK_TOLERANCE, parts_of_columns, without
+from ...kinematics.structure.redundancy import RANK_TOLERANCE, without
 from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism, Reduced, Vector
 from ...mechanism.motions import JointDriver
@@ -312,3 +312,16 @@ def _extend_span(span: Array, rows: Array) -> Array:
     """Return an orthonormal basis of a span and further rows."""
     _, sizes, basis = np.linalg.svd(without(rows, span), full_matrices=False)
     return np.concatenate([span, basis[sizes > RANK_TOLERANCE]])
+
+
+def parts_of_columns(formulation: Cartesian, matrix: Array) -> list[int]:
+    """Return the part of each column: rows tie bodies of one part alone."""
+    parts = [*range(matrix.shape[1])]
+    for first in formulation.columns.values():
+        parts[first : first + COLUMNS] = [first] * COLUMNS
+    for row in matrix:
+        tied = {parts[k] for k in np.flatnonzero(row).tolist()}
+        if len(tied) > 1:
+            first = min(tied)
+            parts = [first if part in tied else part for part in parts]
+    return parts

@@ -99,7 +99,7 @@ def _measure_engines(options: BenchEngines, registry: Registry, *, formulation: 
     from ...extras import THREADS
     from ...harness.record import Outcome
     from ...report.sections import deliver
-    from ...report.terminal import Meter
+    from ..sweep.meter import Meter
     from .bench import engines as bench_engines
     from .bench.report import report
     from .paper import formulation as bench_formulation
@@ -414,7 +414,7 @@ def _run(
     """
     from msgspec.structs import replace
 
-    from ...report.terminal import Meter
+    from ..sweep.meter import Meter
     from .stress.reduction import save
     from .stress.run import stress
 

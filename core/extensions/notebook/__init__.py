@@ -6,7 +6,8 @@ EXTENSION = Extension(
     __name__,
     views={
         "result": "notebook_view:to_html",
-        "mechanism": "notebook_view:view",
+        "mechanism": "notebook_view:mechanism_view",
+        "scene": "notebook_view:scene_view",
         "data": "tables:data_of",
         "frame": "tables:frame_of",
         "arrays": "tables:arrays_of",

@@ -27,7 +27,6 @@ from ...joints import (
     Spherical,
     Spline,
     Translational,
-    linear_relation,
 )
 from ...kinematics import degrees_of_freedom
 from ...mechanism.body import Body, Inertia, checked_inertia
@@ -49,6 +48,7 @@ from .driving import (
     read_start,
 )
 from .gluing import glue
+from .linear_relation import linear_relation
 from .options import ModelOptions
 from .outputs import with_all_motions
 from .place import Place, coordinates, rotation_vector

@@ -13,7 +13,7 @@ from ...joints import (
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE
 from ...trajectory import Array, BodyMotion
-from ..formulation.cartesian import COLUMNS, Cartesian
+from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import frames
 from ..formulation.formulation import Condition
 from ..formulation.state_vectors import displaced
@@ -161,16 +161,3 @@ def largest_residual(
         for each in scaled.primitives(i, j):
             found = max(found, *(float(np.max(np.abs(x), initial=0.0)) for x in each.phi(*pair)))
     return frame.unit * found
-
-
-def parts_of_columns(formulation: Cartesian, matrix: Array) -> list[int]:
-    """Return the part of each column: rows tie bodies of one part alone."""
-    parts = [*range(matrix.shape[1])]
-    for first in formulation.columns.values():
-        parts[first : first + COLUMNS] = [first] * COLUMNS
-    for row in matrix:
-        tied = {parts[k] for k in np.flatnonzero(row).tolist()}
-        if len(tied) > 1:
-            first = min(tied)
-            parts = [first if part in tied else part for part in parts]
-    return parts
