@@ -373,6 +373,15 @@ class Mechanism(ByContent):
         )
 
     @cached_property
+    def joints_on(self) -> Mapping[str, Sequence[Joint]]:
+        """Joints by the bodies that they join."""
+        found: dict[str, list[Joint]] = {}
+        for joint in self.joints:
+            for body in joint.bodies:
+                found.setdefault(body, []).append(joint)
+        return found
+
+    @cached_property
     def _places(self) -> Sequence[Vector]:
         return [place for joint in self.joints for place in joint.points_on()]
 

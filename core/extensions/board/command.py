@@ -13,9 +13,9 @@ from ...cli.parser import Command
 from ...cli.registry import Registry, Status
 from ...doors import offers
 from ...errors import KincheckError, refuse
-from ...extras import ENVIRONMENTS
 from ...harness.resource_limits import TIMEOUT
 from ...options import destination, option, options, positive, whole
+from ..environments.environments import ENVIRONMENTS
 
 if TYPE_CHECKING:
     from .truth import Truth
