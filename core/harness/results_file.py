@@ -12,7 +12,8 @@ from typing import Any, Literal, TypeAlias
 import msgspec
 
 from ..case.case import Truth
-from ..case.io.document import fault, join, read_text, shown
+from ..case.io.document import fault, read_text, shown
+from ..case.io.lines import join
 from ..mechanism.mechanism import GROUND
 from ..trajectory import QUANTITIES
 from .record import Outcome, OutputSeries, Record, Results, from_json

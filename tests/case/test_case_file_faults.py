@@ -217,7 +217,7 @@ BROKEN = {
     "key twice": (("rate = 2.0", "rate = 2.0\nrate = 2.0"), "not valid TOML"),
     "no reference file": (
         ("[outputs.tip_x]", BY_FILE + "[outputs.tip_x]"),
-        "case.toml: reference.file: found 'tip.csv', but there is no such file",
+        "case.toml: line 27: reference.file: found 'tip.csv', but there is no such file",
     ),
     "file and rows": (
         ("[outputs.tip_x]", BY_FILE + "rows = [[1, 1]]\n[outputs.tip_x]"),

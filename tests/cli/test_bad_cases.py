@@ -40,7 +40,7 @@ def test_run_continues_beside_unreadable_case(kincheck_main, capsys, tmp_path, m
     for _ in range(2):
         assert kincheck_main("run crank", bad, "crank_two", *files) == 2
     captured = capsys.readouterr()
-    message = f"{bad}: schema: found"
+    message = f"{bad}: line 1: schema: found"
     assert captured.err.count(message) == 2  # once each run
     assert captured.err.index(message) < captured.err.index("[1/2] crank native: pass")
     found = read_results(Path("out/results.json"))

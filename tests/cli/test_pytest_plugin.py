@@ -163,7 +163,7 @@ def test_plugin_reports_invalid_file(repository, pytest_there):
     (repository / "broken.json").write_text('{"schema": "kincheck-case/7", "name": "a"}')
     out, status = pytest_there("--kincheck", "--kincheck-engine", "native")
     assert status == 2
-    assert "broken.json: schema: " in out
+    assert "broken.json: line 1: schema: " in out
     assert "kincheck-case/7" in out
 
 

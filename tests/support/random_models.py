@@ -130,7 +130,8 @@ def urdf_tree(robot, frames=()):
             f'<origin xyz="{text(each.center)}"/><inertia{attributes}/></inertial></link>'
             f'<joint name="j{each.name}" type="{kind}"><parent link="{each.outer}"/>'
             f'<child link="{each.name}"/><origin xyz="{text(at)}" rpy="{text(rpy(R))}"/>'
-            f'<axis xyz="{text(each.turn.T @ each.axis)}"/><dynamics damping="{each.law[1]!r}"/>'
+            f'<axis xyz="{text(each.turn.T @ each.axis)}"/>'
+            f'<dynamics damping="{float(each.law[1])!r}"/>'
             "</joint>"
         )
     for name, link in frames:

@@ -27,12 +27,10 @@ from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy, similar, 
 from ..units import METRE, FileUnits, Unit
 from .escape import visible
 from .foreign import binary, foreign
+from .lines import DEEPEST, TEXT, join, place
 
 # Squares and products of numbers within these bounds neither overflow nor underflow.
 LARGEST, SMALLEST = 1e100, 1e-100
-# Tables of a case are three levels deep, rows of numbers two more. Deeper nesting only obscures a
-# message.
-DEEPEST = 16
 # Texts give the sources of numbers; a longer text hides the rest of a message.
 LONGEST_TEXT = 10_000
 LONGEST_MESSAGE = 3_000
@@ -40,10 +38,7 @@ LONGEST_MESSAGE = 3_000
 _TOO_MANY_DIGITS = "Exceeds the limit"
 # Time and memory of tomllib grow with the square of a dotted key's length: gigabytes for a key of a
 # hundred kilobytes.
-_TOML_TEXT = re.compile(
-    r'"""(?:[^"\\]|\\.|"(?!""))*+"*+|\'\'\'(?:[^\']|\'(?!\'\'))*+\'*+|"(?:[^"\\\n]|\\.)*+"?|\'[^\'\n]*+\'?|#[^\n]*+',
-    re.DOTALL,
-)
+_TOML_TEXT = re.compile(TEXT, re.DOTALL)
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST + 1}}}")
 
 _short = reprlib.Repr()
@@ -52,11 +47,12 @@ _short.maxlevel = 3
 
 
 def fault(file: Path, key: str, problem: str) -> CaseError:
-    """Return the error 'FILE: KEY: PROBLEM', or 'FILE: PROBLEM' without a key.
+    """Return the error 'FILE: KEY: PROBLEM', or 'FILE: PROBLEM' without a key; with the line before
+    a key of TOML, JSON or YAML.
 
     A long message loses its middle.
     """
-    whole = visible(": ".join(filter(None, (str(file), key, problem))))
+    whole = visible(": ".join(filter(None, (str(file), place(file, key), problem))))
     half = LONGEST_MESSAGE // 2
     return CaseError(
         whole if len(whole) <= LONGEST_MESSAGE else f"{whole[:half]} [...] {whole[-half:]}"
@@ -120,12 +116,6 @@ def require_known(
     """Refuse a name that is none of the known ones; see `unknown_name`. None is no name."""
     if name is not None and name not in (names := [*known]):
         raise unknown_name(file, key, name, names, expected)
-
-
-def join(key: str, name: str) -> str:
-    """Return the path of a key inside a table."""
-    name = name if name.isprintable() and name else repr(name)
-    return f"{key}.{name}" if key else name
 
 
 def decimal(text: str) -> float:

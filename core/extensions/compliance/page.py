@@ -138,7 +138,8 @@ def place(curves: ComplianceCurves) -> str:
 
 def _value(value: float | None, unit: str) -> tuple[str, str]:
     shown, factor = shown_unit(unit)
-    return ("–" if value is None else digits(factor * value, 4), "" if shown == "1" else shown)
+    written = "–" if value is None else digits(factor * value, 4).replace("-", "\N{MINUS SIGN}")
+    return written, "" if shown == "1" else shown
 
 
 def _matrix(curves: ComplianceCurves) -> list[list[str]]:

@@ -45,20 +45,28 @@ def springs_in(texts: Sequence[str]) -> dict[str, Rate]:
     for text in texts:
         name, _, rest = text.partition(":")
         rate, _, force = rest.partition(",")
-        try:
-            stiffness, unit = measure(rate, RATES, "N/m")
-            preload, of_force = measure(force, FORCES, "N") if force else (0.0, "N")
-        except ValueError:
-            unit = of_force = ""
-            stiffness = preload = math.nan
-        if not (unit and of_force and 0.0 < stiffness < math.inf and math.isfinite(preload)):
-            raise KincheckError(
-                f"--spring {text!r}: expected a name and a rate in {', '.join(RATES)}, with a"
-                f" decimal point, and perhaps the force at design in N or kN. Say {EXAMPLE}, or"
-                ' "spring: 35.5 N/mm, 3 kN"'
-            )
-        found[name.strip()] = (stiffness, preload)
+        stiffness, preload = _size(rate, RATES), _size(force, FORCES) if force else 0.0
+        if not 0.0 < stiffness < math.inf:
+            wrong = f"{rate.strip()!r} is not a positive rate in {', '.join(RATES)}"
+        elif not math.isfinite(preload):
+            wrong = f"{force.strip()!r} is not a force at design in {', '.join(FORCES)}"
+        else:
+            found[name.strip()] = (stiffness, preload)
+            continue
+        raise KincheckError(
+            f"--spring {text!r}: {wrong}. Decimals have a point. Say {EXAMPLE}, or"
+            ' "spring: 35.5 N/mm, 3 kN"'
+        )
     return found
+
+
+def _size(text: str, units: Mapping[str, Unit]) -> float:
+    """Return a measure in SI; NaN of what is none or has no unit."""
+    try:
+        size, unit = measure(text, units, next(iter(units)))
+    except ValueError:
+        return math.nan
+    return size if unit else math.nan
 
 
 def places_of(case: Case) -> dict[str, list[MotionRatio]]:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...case.io.document import Section, fault, parse, shown
-from ...errors import MOST_NAMED, remedy, sentence, shortened
+from ...errors import MOST_NAMED, brief, remedy, sentence, shortened
 from .options import WheelOptions
 from .table import Hardpoint, HardpointTable, number, require_name, twice, wanted_corner
 
@@ -404,7 +404,7 @@ def read_assetto(file: Path, text: str, supplied: WheelOptions) -> HardpointTabl
                 raise twice(file, f"line {k}", key, keys[key][0])
             keys[key] = (f"line {k}", value)
         elif row:
-            stray.append(f"line {k}")
+            stray.append(f"line {k} ({brief(row)})")
     axles = [name for name, keys in sections.items() if any(map(_OF_ASSETTO.fullmatch, keys))]
     corner = None if supplied.corner is None else wanted_corner(file, supplied.corner)
     wanted = supplied.sheet or (corner[0] if corner else "")

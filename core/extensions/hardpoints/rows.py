@@ -33,7 +33,7 @@ from ...case.io.table import (
     trim,
 )
 from ...case.units import LENGTHS
-from ...errors import MOST_NAMED, OpenError, brief, number_of, shortened
+from ...errors import MOST_NAMED, OpenError, brief, shortened
 from .options import NOTHING, WheelOptions
 from .programs import plain_lines
 from .table import (
@@ -109,13 +109,17 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
         CaseError: no head, or a row at odds with the head.
     """
     table = text_table(file, text.splitlines(), COMMENTS, _delimiter)
-    facts, remarks = dict[str, str](), 0
-    for comment in table.comments:
+    facts, remarks, comments = dict[str, str](), list[str](), {*table.comments}
+    for k, comment in enumerate(text.splitlines(), 1):
+        if comment not in comments:
+            continue
+        where = f"line {k}"
         bare = comment.strip('" \t\r').lstrip("".join(COMMENTS)).rstrip(f'"{DELIMITERS}')
         if fact := fact_of(_SIGNS.sub(",", bare)):
-            add_fact(file, "", facts, fact)
-        require_no_slip(file, f"line {text.splitlines().index(comment) + 1}", bare)
-        remarks += fact is None and bool(bare.strip())
+            add_fact(file, where, facts, fact)
+        require_no_slip(file, where, bare)
+        if fact is None and bare.strip():
+            remarks.append(_note(where, [bare.strip()]))
     lines = [
         (f"line {k}", line)
         for k, line in enumerate(table.lines, 1)
@@ -143,10 +147,7 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
             f"found {shown(supplied.sheet)} for a table of text, expected none. Leave it out",
         )
     found = read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
-    if remarks:
-        said = f"{number_of(remarks, 'line')} of comments"
-        found = replace(found, left_out=[*found.left_out, said])
-    return found
+    return replace(found, left_out=[*found.left_out, *remarks])
 
 
 def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:

@@ -74,7 +74,8 @@ def read_python(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hard
     except (SyntaxError, ValueError, RecursionError, MemoryError, tokenize.TokenError) as error:
         why = brief(f"{type(error).__name__}: {error}".replace("\n", " "))
         raise fault(file, "", f"is no Python script of points ({why}). Correct it") from None
-    left_out = [f"line {each.lineno}" for (each, _, targets), _ in found if not targets]
+    lines, others = text.split("\n"), (each.lineno for (each, _, to), _ in found if not to)
+    left_out = [f"line {k} ({brief(lines[k - 1].strip())})" for k in others]
     leaves = [leaf for _, own in found for leaf in own if leaf.keys[0] not in script.named]
     if len(leaves) >= MOST_LINES:
         raise fault(file, "", f"found more than {MOST_LINES} values. Give the points only")

@@ -222,7 +222,7 @@ def read_assignments(
             if fact := fact_of(line):
                 add_fact(file, where, facts, fact)
             elif line.strip():
-                left_out.append(where)
+                left_out.append(f"{where} ({brief(line.strip())})")
             continue
         keys = tuple(each.strip() for each in _KEY.sub(r".\1", assigned[1]).split(".") if each)
         text, comment = assigned[2], _COMMENT.search(assigned[2])

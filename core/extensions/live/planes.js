@@ -154,7 +154,9 @@ function planes(box, points, { metres, file, step }, design, choose) {
       state.drawing = drawing;
       state.motion = motion;
       const places = [...state.motion.places, design.start.map(metres)];
-      state.bounds = state.bounds || boundsOf({ places, wheels: [], forces: [] });
+      // The road is wider than the wheel and would make the points small.
+      const wheels = motion.wheels.flat().map(({ tyre }) => ({ tyre, road: [] }));
+      state.bounds = state.bounds || boundsOf({ places, wheels, forces: [] });
       drawNow();
     },
     ghost(drawing) {

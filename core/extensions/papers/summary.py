@@ -21,7 +21,7 @@ SENTENCE, ROW = (14.0, 88), (12.0, 96)
 """Height [pt] and characters of a line of a sentence, and of a row of a table."""
 HEAD, EDGE = 95.0, 4.5
 """Height of a section's heading, note and head of a table, and of the edges of a row [pt]."""
-VERDICT, FACTS, CAPTION, LONG, CELL = 240, 300, 150, 330, 80
+VERDICT, FACTS, CAPTION, LONG, CELL = 240, 300, 150, 330, 96
 """Most characters; the report has all."""
 SIZE = 400, 400
 """Size of a figure: a quarter of the first page's rest [px]."""

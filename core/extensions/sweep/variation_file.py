@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...case.case import Case, Quantity
-from ...case.io.document import decimal, fault, join, read_tables, shown, typed
+from ...case.io.document import decimal, fault, read_tables, shown, typed
+from ...case.io.lines import join
 from ...case.io.table import read_unit
 from ...case.units import ANGLES, LENGTHS, RADIAN
 from ...errors import KincheckError, remedy, unknown

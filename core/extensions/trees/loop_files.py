@@ -40,7 +40,16 @@ from typing import Annotated, Any, Literal, cast
 import msgspec
 
 from ...algebra import Vec3, X, Y, Z, cross, quat, vec
-from ...case.io.document import fault, parse, read_text, shown, unknown_name, usable
+from ...case.io.document import (
+    Section,
+    fault,
+    parse,
+    read_text,
+    shown,
+    unknown_name,
+    usable,
+)
+from ...case.io.lines import join, place
 from ...errors import WARNING, CaseError, remedy, shortened, similar
 from ...joints.base import triad
 from ...joints.polynomial import HIGHEST
@@ -109,10 +118,16 @@ class BodyFrame(msgspec.Struct, frozen=True):
 
 
 class ConstraintsFile(msgspec.Struct, frozen=True):
-    """NAME.constraints.json; its other keys are for people."""
+    """NAME.constraints.json; what a reader of the URDF needs not know has no type."""
 
     constraints: list[Condition]
+    schema: Any
     bodies: dict[str, BodyFrame] = {}
+    mechanism: Any = None
+    units: Any = None
+    meaning: Any = None
+    points: Any = None
+    start: Any = None
 
 
 class HingeOfBase(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -208,7 +223,7 @@ class LoopFiles:
             if not all(map(usable, (*each.origin, *each.euler_parameters))) or not any(
                 each.euler_parameters
             ):
-                raise fault(file, f"bodies: {name}", "has no frame; export the case anew")
+                raise fault(file, join("bodies", name), "has no frame; export the case anew")
             turn = unit_quaternion(quat(each.euler_parameters))
             frame = Place(vec(each.origin), turn)
             tree.places[name] = tree.places[name] * frame
@@ -240,7 +255,8 @@ def read_loop_files(root: Element) -> LoopFiles:
             notes.append(f"{paired.name} beside it is of other links, and not read")
             continue
         if unread:
-            notes.append(f"{paired.name}: not read: {shortened(unread, MOST_NAMED)}")
+            where = shortened([place(paired, name) for name in unread], MOST_NAMED)
+            notes.append(f"{paired.name}: not read: {where}")
         for key, name in [
             *(("joint_name", name) for name in pairs.joint_name),
             *(("ball_upgrades", name) for name in pairs.ball_upgrades),
@@ -296,6 +312,12 @@ def _text(file: Path) -> str:
     return read_text(file, LARGEST_FILE, "it holds the loops of one robot; take out the rest")
 
 
+def _misfit(file: Path, error: msgspec.ValidationError, advice: str) -> CaseError:
+    """Return the error of a value that has another type than the format says, by its key."""
+    what, _, path = str(error).partition(" - at `$")
+    return fault(file, path.strip("`."), f"{what}; {advice}")
+
+
 def _constraints(file: Path) -> ConstraintsFile:
     tables: dict[str, Any] = parse(file, _text(file))
     if tables.get("schema") != SCHEMA:
@@ -305,10 +327,11 @@ def _constraints(file: Path) -> ConstraintsFile:
             f"found {tables.get('schema')!r}, expected {SCHEMA!r}, as kincheck export writes it;"
             " rename a file of another kind",
         )
+    Section(file, "", tables).require_keys(ConstraintsFile.__struct_fields__)
     try:
         return msgspec.convert(tables, ConstraintsFile)
     except msgspec.ValidationError as error:
-        raise CaseError(str(fault(file, "constraints", f"{error}; export the case anew"))) from None
+        raise _misfit(file, error, "export the case anew") from None
 
 
 def _pairs(file: Path) -> tuple[PairsFile, list[str]]:
@@ -327,11 +350,8 @@ def _pairs(file: Path) -> tuple[PairsFile, list[str]]:
     try:
         found = msgspec.convert(data, PairsFile, strict=False)
     except msgspec.ValidationError as error:
-        raise fault(
-            file,
-            "",
-            f"{error}, expected {', '.join(known)}; correct it, or rename a file of another kind",
-        ) from None
+        advice = f"expected {', '.join(known)}; correct it, or rename a file of another kind"
+        raise _misfit(file, error, advice) from None
     for key, values, other, others in (
         ("type", found.type, "closed_loop", found.closed_loop),
         ("joint_type", found.joint_type, "joint_name", found.joint_name),
@@ -358,24 +378,24 @@ def _add_pairs(file: Path, pairs: PairsFile, graph: Graph) -> None:
     # as in Pinocchio, a joint has a frame too: that of its link
     frames = {joint.name: joint.links[1] for joint in graph.joints}
     frames |= {name: name for name in graph.places}
-    for names, kind in zip(pairs.closed_loop, pairs.type, strict=True):
+    for k, (names, kind) in enumerate(zip(pairs.closed_loop, pairs.type, strict=True)):
+        element = Element(file, "", {}, 1, words=f"closed_loop[{k}]: {' = '.join(names)}")
         for name in names:
             if name not in frames:
-                raise unknown_name(file, "closed_loop", name, frames, "a link or joint")
+                raise element.unknown_name("link", name, frames, "a link or joint")
         first, second = (frames[name] for name in names)
         places = graph.places[first], graph.places[second]
-        title = f"{names[0]} = {names[1]}"
-        element = Element(file, "", {}, 1, words=f"closed_loop: {title}")
+        title = " = ".join(names)
         freedoms: list[Freedom] = [("", "ball", X)] if kind.lower() == "3d" else []
         links, at = (first, second), places[0].at
         graph.loops.append(Joint.of(title, links, at, freedoms, element, frames=places))
-    for k, each in enumerate(pairs.closures, 1):
+    for k, each in enumerate(pairs.closures):
         point = vec(each.point)
-        element = Element(file, "", {}, 1, words=f"closures {k}")
+        element = Element(file, "", {}, 1, words=f"closures[{k}]")
         _add_loop(graph, each, (each.link_a, each.link_b), (point, point), element)
     for key, rows in (("ball_loops", pairs.ball_loops), ("pin_loops", pairs.pin_loops)):
-        for k, each in enumerate(rows, 1):
-            element = Element(file, "", {}, 1, words=f"{key} {each.name or k}")
+        for k, each in enumerate(rows):
+            element = Element(file, "", {}, 1, words=f"{key}[{k}]")
             if (each.axis is None) != (key == "ball_loops"):
                 raise element.fault("axis: expected one in pin_loops alone; correct it")
             links = each.parent, each.child
@@ -414,14 +434,15 @@ def _add_constraints(file: Path, found: ConstraintsFile, graph: Graph) -> None:
         if each.kind not in RELATIONS:
             groups.setdefault(each.joint, []).append(each)
     for name, conditions in groups.items():
-        _Group(_element(file, name), name, conditions, graph).add()
+        element = _element(file, found.constraints.index(conditions[0]), name)
+        _Group(element, name, conditions, graph).add()
     names = {*groups}
     for k, each in enumerate(found.constraints, 1):
         if each.kind not in RELATIONS:
             continue
         name = each.joint if each.joint not in names else f"{each.joint}.{k}"
         names.add(name)
-        element = _element(file, each.joint)
+        element = _element(file, k - 1, each.joint)
         if each.kind == "linear":
             coupling = Coupling(name, each.weights, {}, (0.0,), element)
         elif each.coefficients or each.points:
@@ -433,8 +454,8 @@ def _add_constraints(file: Path, found: ConstraintsFile, graph: Graph) -> None:
         graph.couplings.append(coupling)
 
 
-def _element(file: Path, joint: str) -> Element:
-    return Element(file, "", {}, 1, words=f"constraints: joint {joint!r}")
+def _element(file: Path, k: int, joint: str) -> Element:
+    return Element(file, "", {}, 1, words=f"constraints[{k}]: joint {joint!r}")
 
 
 class _Group:

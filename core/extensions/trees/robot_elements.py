@@ -92,11 +92,11 @@ def add_spring(graph: Graph, move: str, values: Mapping[str, str]) -> None:
     try:
         if any(map(number, FRICTION)):
             graph.tree.count("friction and rotors of joints")
-        law = number("spring_stiffness"), number("damping")
+        law, rest = (number("spring_stiffness"), number("damping")), number("spring_reference")
         if min(law) < 0.0:
             raise ValueError(move)
         if any(law):
-            graph.tree.springs[move] = Spring(*law, number("spring_reference"))
+            graph.tree.springs[move] = Spring(*law, rest)
     except ValueError:
         graph.tree.count("dynamics of joints")
 
@@ -374,7 +374,7 @@ def _words(element: Element) -> Iterator[tuple[str, str]]:
         elif tag not in _NAMED:
             yield from ((tag, word) for word in _split(value))
     hint = f"{tag} {own}".lower() if tag == "param" else tag
-    yield from ((hint, word) for word in _split(element.text))
+    yield from ((hint, word) for word in _split("".join(element.texts)))
 
 
 def _split(text: str) -> Iterator[str]:

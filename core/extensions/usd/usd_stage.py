@@ -109,7 +109,7 @@ def _require_near(file: Path, pxr: Any) -> None:
             continue
         known.add(path)
         if len(known) > MOST_LAYERS:
-            raise refuse("", f"found more than {MOST_LAYERS} layers, expected fewer")
+            raise refuse(f"found more than {MOST_LAYERS} layers,", "expected no more")
         own = file if package == str(file.resolve()) else Path(package)
         require_file(own, LARGEST_LAYER, "take out shapes")
         layer = pxr.Sdf.Layer.FindOrOpen(path)

@@ -410,10 +410,10 @@ def settle(root: Element, apart: Apart) -> Account:
             if not extended or similar(name, alike, ALIKE):
                 raise element.unknown_attribute(name, alike, apart.format_name)
             left_out[f"{name} of {element.tag}"] += 1
-        if "".join(element.texts).strip():
+        if text := "".join(element.texts).strip():
             unread = TEXT not in element.marks
             read, left = read + (not unread), left + unread
-            left_out[f"text of {element.tag}"] += unread
+            left_out[f"text {shown(text)} of {element.tag}"] += unread
         inside: list[tuple[str, Element]] = []
         for child in element.children:
             tag = f"<{child.tag}>"

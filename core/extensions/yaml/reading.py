@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from ...case.io.document import check_values, fault, shown
 
@@ -39,19 +39,22 @@ def parse_yaml(file: Path, text: str) -> Any:
 
         def compose_node(self, parent: Any, index: Any) -> Any:
             if self.check_event(yaml.AliasEvent):  # pyright: ignore[reportUnknownMemberType]
-                raise yaml.YAMLError("found a reference (*NAME), expected none")
+                line = cast("Any", self).peek_event().start_mark.line + 1
+                raise yaml.YAMLError(f"line {line}: found a reference (*NAME), expected none")
             return super().compose_node(parent, index)
 
         def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-            keys = [key.value for key, _ in node.value if isinstance(key.value, str)]
-            if len(set(keys)) < len(keys):
-                twice = next(key for k, key in enumerate(keys) if key in keys[:k])
-                raise yaml.YAMLError(f"the key {shown(twice)} is given twice")
+            keys = set[str]()
+            for key in (key for key, _ in node.value if isinstance(key.value, str)):
+                if key.value in keys:
+                    line = key.start_mark.line + 1
+                    raise yaml.YAMLError(f"line {line}: the key {shown(key.value)} is given twice")
+                keys.add(key.value)
             return super().construct_mapping(node, deep)
 
     try:
         data: Any = yaml.load(text, Plain)
-        check_values(file, {"content": data})
+        check_values(file, data)
         return data
     except RecursionError:
         what = "nested too deeply"

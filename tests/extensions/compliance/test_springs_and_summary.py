@@ -93,9 +93,10 @@ def test_spring_has_the_tables_own_name(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("spring", "said"),
     [
-        ("spring: 35", "expected a name and a rate in N/m, N/mm"),
-        ("spring: -35 N/mm", "expected a name and a rate"),
-        ("spring: 35 N/mm, 3", "and perhaps the force at design in N or kN"),
+        ("spring: 35", "'35' is not a positive rate in N/m, N/mm"),
+        ("spring: -35 N/mm", "'-35 N/mm' is not a positive rate"),
+        ("spring: 35 N/mm, 3", "'3' is not a force at design in N, kN"),
+        ("spring: 35,5 N/mm", "'35' is not a positive rate"),
         ("damper: 35 N/mm", "there is no spring 'damper', but spring, tire"),
     ],
 )

@@ -310,9 +310,9 @@ def test_names_file_precedes_known_names(tmp_path):
     ("line", "fragments"),
     rows(
         """
-lca_inner = "lca_front" | names.toml: lca_inner ... expected a role ... lca_outer
-lca_front = "lca_fornt" | names.toml: lca_front ... 'lca_fornt' ... 'lca_front'
-lca_front = 3 | names.toml: lca_front ... found 3 ... quotes
+lca_inner = "lca_front" | names.toml: line 1: lca_inner ... expected a role ... lca_outer
+lca_front = "lca_fornt" | names.toml: line 1: lca_front ... 'lca_fornt' ... 'lca_front'
+lca_front = 3 | names.toml: line 1: lca_front ... found 3 ... quotes
 lca_front | names.toml ... not valid TOML
 """,
         named=False,

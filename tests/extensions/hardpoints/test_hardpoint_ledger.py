@@ -95,11 +95,16 @@ def test_account_of_table_adds_up(seed, tmp_path):
     table = read_hardpoints(write(tmp_path, "\n".join(lines), "car.csv"))
     assert (table.unit, table.axes) == ("mm", "forward,left,up")
     assert len(table.points) == counts["points"]
-    (comments,) = [int(each.split()[0]) for each in table.left_out if "of comments" in each] or [0]
-    assert comments == counts["comments"]
+    comments = [each for each in table.left_out if "(remark " in each]
+    assert comments == [
+        f"line {k} ({line[2:]})" for k, line in enumerate(lines, 1) if line.startswith("# remark")
+    ]
+    assert len(comments) == counts["comments"]
     assert sum(each.startswith("column ") for each in table.left_out) == counts["columns"]
-    assert sum(each.startswith("line ") for each in table.left_out) == counts["rows"]
-    assert len(table.left_out) == bool(comments) + counts["columns"] + counts["rows"]
+    assert sum(each.startswith("line ") for each in table.left_out) == (
+        counts["rows"] + counts["comments"]
+    )
+    assert len(table.left_out) == counts["comments"] + counts["columns"] + counts["rows"]
 
 
 def test_other_sheets_and_columns_are_listed(tmp_path):

@@ -58,7 +58,7 @@ def test_matlab_expression_is_omitted(tmp_path, value):
     found = read_hardpoints(file, Supplied("double_wishbone", "mm", "iso"))
     assert "hp.other" not in found.points
     assert "hp.other" in " ".join(found.left_out)
-    assert re.search(r"line \d+$", found.left_out[0])
+    assert re.fullmatch(r"line \d+ \(clear all\)", found.left_out[0])
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_python_class_of_points_is_read(tmp_path):
     file.write_text(f"import numpy\n\nclass Front:\n    wheel = Front()\n{rows}\n")
     found = read_hardpoints(file, Supplied("double_wishbone", "mm", "iso"))
     assert {name.split(".")[-1]: each.position for name, each in found.points.items()} == POINTS
-    assert found.left_out[0] == "line 1"
+    assert found.left_out[0] == "line 1 (import numpy)"
     assert "wheel" in " ".join(found.left_out)
 
 

@@ -2,7 +2,7 @@
 
 For many more:
 
-    KINCHECK_ROBOTS=30 pytest -m "" tests/studies/test_same_robots.py
+    KINCHECK_ROBOTS=30 pytest -m "" tests/extensions/same/test_same_robots.py
 """
 
 import importlib.util

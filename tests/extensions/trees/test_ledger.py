@@ -84,7 +84,8 @@ def said(file):
         tree = read_tree(file)
     except CaseError as error:
         return str(error)
-    return "\n".join([*tree.left_out, *tree.notes])
+    unread = (f"inertial of {link}" for link in tree.unweighed)  # a case lists these
+    return "\n".join([*tree.left_out, *tree.notes, *unread])
 
 
 def is_listed(said, tags):
@@ -100,6 +101,7 @@ PLANTS = {
     "foreign element": lambda each: each.append(ElementTree.Element(f"acme:{NAME}")),
     "attribute": lambda each: each.set(NAME, "1"),
     "foreign attribute": lambda each: each.set(f"acme:{NAME}", "1"),
+    "text": lambda each: setattr(each, "text", f"{each.text or ''}{NAME}"),
 }
 
 

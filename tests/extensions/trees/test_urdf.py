@@ -148,7 +148,7 @@ def test_pairs_file_with_open_zero_pose(tmp_path):
     pytest.importorskip("yaml")
     file = edited(tmp_path, PAIRED, ('xyz="0 0 3"', 'xyz="0 0 1.5"'), name="robot.urdf")
     case = load(robot(tmp_path, file.read_text(), yaml=PAIRS), DRIVE)
-    said = "the start (its zero pose) is assembled: closed_loop: X = y was open by 1.5 m"
+    said = "the start (its zero pose) is assembled: closed_loop[0]: X = y was open by 1.5 m"
     assert said in case.assembly[0]
     solution(case)
 

@@ -85,7 +85,7 @@ def test_closures_of_others_are_noted(tmp_path):
     (tmp_path / "robot.toml").write_text('schema = "kincheck-case/1"\n')
     notes = load(file, driven("A:0:0.5:3", hold_rest=True)).assembly
     assert "loop_closures.yaml beside it is of other links, and not read" in notes
-    assert "robot.yaml: not read: controller" in notes
+    assert "robot.yaml: not read: line 1: controller" in notes
     said = [each.split(" beside")[0] for each in notes if "beside it may close loops" in each]
     assert [each.removeprefix("warning: ") for each in said] == sorted(unread[:3])
     assert any(each.startswith("warning: held by --hold-rest") for each in notes)

@@ -127,6 +127,20 @@ def test_reference_from_elsewhere_is_refused(write, tmp_path, asset, problem):
         read_tree(file)
 
 
+@pytest.mark.parametrize("count", [1_000, 1_001])
+def test_stage_of_many_layers_is_read(tmp_path, count):
+    """Layers beside one another: empty ones, and the stage."""
+    for k in range(count - 1):
+        (tmp_path / f"{k}.usda").write_text("#usda 1.0\n")
+    layers = ", ".join(f"@{k}.usda@" for k in range(count - 1))
+    units = f'metersPerUnit = 1\n    upAxis = "Z"\n    subLayers = [{layers}]'
+    (file := tmp_path / "m.usda").write_text(stage(*ARM, units=units))
+    if count == 1_000:
+        assert [*read_tree(file).joints] == ["j"]
+    else:
+        refused(lambda: read_tree(file), "m.usda: found more than 1000 layers, expected no more")
+
+
 INVALID = b'#usda 1.0\ndef "\xff\xff"'
 OTHER = [b"", b"hello", b"PXR-USDC", b"PK\x03\x04", bytes(99), INVALID]
 

@@ -1,0 +1,140 @@
+"""Places in texts of TOML, JSON and YAML: the path of a key, and the line it stands in."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+# A message is made in a second.
+LONGEST, LONGEST_YAML, MOST_KEYS = 4_000_000, 500_000, 500_000
+# Tables of a case are three levels deep, rows of numbers two more. Deeper nesting only obscures a
+# message.
+DEEPEST = 16
+# Texts, and comments, of JSON and TOML.
+TEXT = (
+    r'"""(?:[^"\\]|\\.|"(?!""))*+"*+|\'\'\'(?:[^\']|\'(?!\'\'))*+\'*+'
+    r'|"(?:[^"\\\n]|\\.)*+"?|\'[^\'\n]*+\'?|#[^\n]*+'
+)
+_TOKEN = re.compile(rf"{TEXT}|[\[\]{{}}=:,.\n]|[^\s\[\]{{}}=:,.\"'#]++", re.DOTALL)
+
+
+def join(key: str, name: str) -> str:
+    """Return the path of a key inside a table."""
+    name = name if name.isprintable() and name else repr(name)
+    return f"{key}.{name}" if key else name
+
+
+def place(file: Path, key: str) -> str:
+    """Return 'line N: KEY' for a key in a file of TOML, JSON or YAML, else the key.
+
+    The line is that of the closest table around it, if the file has no such key.
+    """
+    keys = {".toml": keys_of, ".json": keys_of, ".yaml": _keys_of_yaml, ".yml": _keys_of_yaml}
+    read, line = keys.get(file.suffix.lower()), 0
+    if read and key:
+        with suppress(OSError, ValueError):
+            if file.stat().st_size <= (LONGEST if read is keys_of else LONGEST_YAML):
+                line = line_of(key, read(file.read_text("utf-8-sig")))
+    return f"line {line}: {key}" if line else key
+
+
+def line_of(key: str, keys: Iterable[tuple[str, int]]) -> int:
+    """Return the first line of a key, or else of what is in it, or else of the closest table around
+    it; 0 if there is none.
+    """
+    inside, closest, around = 0, "", 0
+    for path, line in islice(keys, MOST_KEYS):
+        if path == key:
+            return line
+        if not inside and _within(path, key):
+            inside = line
+        elif len(path) > len(closest) and _within(key, path):
+            closest, around = path, line
+    return inside or around
+
+
+def _within(path: str, key: str) -> bool:
+    return path.startswith(key) and path[len(key) : len(key) + 1] in (".", "[", ":")
+
+
+def keys_of(text: str) -> Iterator[tuple[str, int]]:
+    """Yield the path of each key and item of a TOML or JSON text, with its line."""
+    heading, counts = "", Counter[str]()
+    # the path of each open bracket, and the number of its item; None for a table
+    above: list[tuple[str, int | None]] = []
+    names: list[str] = []
+    value: str | None = None  # path of the value that stands here
+    line, opened = 1, 0  # brackets of the heading that stands here
+    for token in _TOKEN.findall(text):
+        here, line = line, line + token.count("\n")
+        path, item = above[-1] if above else (heading, None)
+        if item is not None:
+            value = f"{path}[{item}]"
+            if token not in {"\n", ",", "]"} and token[0] != "#":
+                yield value, here
+        if value is not None and token in {"{", "["}:
+            above.append((value, None if token == "{" else 0))
+            value = None
+        elif token in {"}", "]"} and above:
+            above.pop()
+            value = None
+        elif token == "," and item is not None:
+            above[-1] = path, item + 1
+        elif token == "," or (token == "\n" and not above):
+            value, names, opened = None, [], 0
+        elif value is not None or token in {"\n", "."} or token[0] == "#":
+            continue
+        elif token == "{":
+            above.append(("", None))
+        elif token == "[":
+            opened += 1
+        elif token == "]" and names:
+            heading = ""
+            for k, name in enumerate(names[:DEEPEST], 1):
+                heading = join(heading, name)
+                counts[heading] += opened == 2 and k == len(names)
+                heading += f"[{counts[heading] - 1}]" if counts[heading] else ""
+            yield heading, here
+            names = []
+        elif token in {"=", ":"}:
+            for name in names[:DEEPEST]:
+                path = join(path, name)
+            value, names = path, []
+            yield value, here
+        else:
+            names.append(_name(token))
+
+
+def _name(token: str) -> str:
+    """Return the name that a key of TOML or JSON writes."""
+    with suppress(ValueError):
+        return json.loads(token) if token[0] == '"' else token.strip("'")
+    return token
+
+
+def _keys_of_yaml(text: str) -> Iterator[tuple[str, int]]:
+    """Yield the path of each key and item of a YAML text, with its line; nothing without PyYAML."""
+    try:
+        import yaml
+    except ImportError:
+        return
+    untyped: Any = yaml
+    with suppress(RecursionError, yaml.YAMLError):
+        yield from _keys_below("", untyped.compose(text, yaml.BaseLoader))
+
+
+def _keys_below(path: str, node: Any) -> Iterator[tuple[str, int]]:
+    found: list[tuple[str, Any, Any]] = []
+    if node and node.id == "mapping":
+        found = [(join(path, str(key.value)), key, value) for key, value in node.value]
+    elif node and node.id == "sequence":
+        found = [(f"{path}[{k}]", value, value) for k, value in enumerate(node.value)]
+    for below, key, value in found:
+        yield below, key.start_mark.line + 1
+        yield from _keys_below(below, value)

@@ -1,0 +1,167 @@
+"""Messages on files of TOML, JSON and YAML give the line of the key."""
+
+import json
+import random
+import re
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.document import Section, fault
+from kincheck.core.case.io.lines import join, keys_of, line_of
+from kincheck.core.case.models.files import load
+from kincheck.core.errors import CaseError
+from kincheck.core.extensions.sweep.variation_file import read_variation
+
+from ..support.case_texts import edited, write
+from ..support.fakes import crank
+from ..support.model_files import driven
+from ..support.sources import ROOT
+
+NAMES = st.text("ab-_\" '#=]{}:,é\\", min_size=1, max_size=4).filter(lambda x: x == x.strip())
+TREES = st.recursive(
+    st.just(0),
+    lambda inner: (
+        st.lists(inner, min_size=1, max_size=3)
+        | st.dictionaries(NAMES, inner, min_size=1, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+def numbered(tree, path="", numbers=None):
+    """The tree with a number of its own at each leaf, and the number at each path."""
+    numbers = {} if numbers is None else numbers
+    if isinstance(tree, dict):
+        return {k: numbered(v, join(path, k), numbers)[0] for k, v in tree.items()}, numbers
+    if isinstance(tree, list):
+        return [numbered(v, f"{path}[{k}]", numbers)[0] for k, v in enumerate(tree)], numbers
+    numbers[path] = 1000 + len(numbers)
+    return numbers[path], numbers
+
+
+def toml(tree, rng, heading=""):
+    """Tables below headings or in braces, lists in one line or in many, with comments between."""
+    lines, below = [], []
+    for name, value in tree.items():
+        key = json.dumps(name, ensure_ascii=False)
+        if isinstance(value, dict) and rng.random() < 0.7:
+            path = f"{heading}.{key}" if heading else key
+            below += [f"[{path}] # [no]", *toml(value, rng, path)]
+        elif isinstance(value, list) and all(isinstance(x, dict) for x in value) and not heading:
+            for each in value:
+                below += [f"[[{key}]]", *toml(each, rng, key)]
+        else:
+            lines += ["# a = 1", f"{key} = {in_line(value, rng)}"]
+    return [*lines, *below]
+
+
+def in_line(value, rng):
+    if isinstance(value, dict):
+        pairs = (
+            f"{json.dumps(k, ensure_ascii=False)} = {in_line(v, rng)}" for k, v in value.items()
+        )
+        return f"{{{', '.join(pairs)}}}"
+    if isinstance(value, list):
+        between = rng.choice([", ", ",\n", ", # ] \n"])
+        return f"[{between.join(in_line(each, rng) for each in value)}]"
+    return str(value)
+
+
+def line_with(text, number):
+    (line,) = (k for k, line in enumerate(text.splitlines(), 1) if str(number) in line)
+    return line
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.dictionaries(NAMES, TREES, min_size=1, max_size=4), st.integers(0, 9))
+def test_each_key_has_its_line(tree, seed):
+    tree, numbers = numbered(tree)
+    rng = random.Random(seed)
+    for text in (json.dumps(tree, indent=1), "\n".join(toml(tree, rng))):
+        for path, number in numbers.items():
+            assert line_of(path, keys_of(text)) == line_with(text, number), (path, text)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.dictionaries(NAMES, TREES, min_size=1, max_size=4), st.booleans())
+def test_yaml_key_has_its_line(tmp_path_factory, tree, flow):
+    yaml = pytest.importorskip("yaml")
+    tree, numbers = numbered(tree)
+    file = tmp_path_factory.mktemp("a") / "a.yaml"
+    text = yaml.safe_dump(tree, default_flow_style=flow, allow_unicode=True)
+    file.write_text(text, "utf-8")
+    for path, number in numbers.items():
+        assert str(fault(file, path, "x")) == f"{file}: line {line_with(text, number)}: {path}: x"
+
+
+def test_lost_key_gets_table_line(tmp_path):
+    file = write(tmp_path, '[a]\nb = 1\n[joints.pin]\ntype = "x"\n', "a.toml")
+    assert str(fault(file, "joints.pin.bodies", "lost")) == (
+        f"{file}: line 3: joints.pin.bodies: lost"
+    )
+    assert str(fault(file, "joints", "lost")) == f"{file}: line 3: joints: lost"
+    assert str(fault(file, "outputs", "lost")) == f"{file}: outputs: lost"
+    assert str(fault(tmp_path / "gone.toml", "a", "lost")).endswith("gone.toml: a: lost")
+
+
+@pytest.mark.parametrize(
+    "name", [path.stem for path in sorted((ROOT / "cases").glob("*.toml"))[::7]]
+)
+def test_planted_key_is_named(tmp_path, name):
+    text = (ROOT / "cases" / f"{name}.toml").read_text()
+    heads = [*re.finditer(r"^\[[\w.\"]+\].*\n", text, re.MULTILINE)]
+    for head in random.Random(name).sample(heads, min(3, len(heads))):
+        planted = f"{text[: head.end()]}zq_unknown = {{}}\n{text[head.end() :]}"
+        line = text.count("\n", 0, head.end()) + 1
+        with pytest.raises(
+            CaseError, match=rf"case\.toml: line {line}: [\w.]*zq_unknown: "
+        ) as found:
+            load_case(write(tmp_path, planted))
+        assert "case.toml" in str(found.value)
+
+
+BESIDE = {
+    "robot.yaml": "closed_loop: [[a, b],\n [a, zq]]\ntype: [3d, 3d] | line 2: closed_loop[1]",
+    "robot.yml": "pin_loops:\n- {parent: a}\n | line 2: pin_loops[0]: Object missing",
+    "robot.constraints.json": (
+        '{"schema": "kincheck-constraints/1",\n"constraints": [],\n"bodes": {}}'
+        " | line 3: bodes: unknown key, expected one of ... did you mean 'bodies'?"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BESIDE)
+def test_file_beside_robot_has_line(tmp_path, name):
+    if not name.endswith("json"):
+        pytest.importorskip("yaml")
+    text, _, said = BESIDE[name].partition(" | ")
+    robot = (
+        "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='continuous'>"
+        "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>"
+    )
+    write(tmp_path, text, name)
+    with pytest.raises(CaseError) as found:
+        load(write(tmp_path, robot, "robot.urdf"), driven("j:0:1:3"))
+    assert all(part in str(found.value) for part in (name, *said.split(" ... ")))
+
+
+def test_variation_is_named_with_line(tmp_path):
+    text = 'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.tip]\nsigmma = 1\n'
+    with pytest.raises(CaseError, match=r"vary\.toml: line 4: hardpoints\.tip\.sigmma: "):
+        read_variation(write(tmp_path, text, "vary.toml"), crank())
+
+
+def test_key_twice_is_named_with_line(tmp_path):
+    file = write(tmp_path, edited(("rate = 2.0", "rate = 2.0\nrate = 2.0")))
+    line = file.read_text().splitlines().index("rate = 2.0") + 2
+    with pytest.raises(CaseError, match=f"line {line}, column"):
+        load_case(file)
+
+
+def test_section_is_named_with_line(tmp_path):
+    file = write(tmp_path, "[a]\n[a.b]\nc = 1\n", "a.toml")
+    section = Section(file, "", {"a": {"b": {"c": 1}}}).at("a").at("b")
+    with pytest.raises(CaseError, match=r"a\.toml: line 3: a\.b\.c: unknown key"):
+        section.require_keys(["d"])
