@@ -50,6 +50,8 @@ class Doors(TypedDict, total=False):
             see `case.io.case_file`.
         motions: type of a driver's motion in case files; see `mechanism.motions.Motion`.
         floors: function for the time of a simulator's compiled code alone, by an engine and a case.
+        lines: function for the keys of a text with their lines, by the suffix of a file; see
+            `case.io.lines`.
         compilers: compiler of plans to machine code; see `program.executor.Compiler`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
@@ -81,6 +83,7 @@ class Doors(TypedDict, total=False):
     closings: _Table
     motions: _Table
     floors: _Table
+    lines: _Table
     compilers: _Table
     methods: _Table
     sections: _Table

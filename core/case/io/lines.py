@@ -1,4 +1,4 @@
-"""Places in texts of TOML, JSON and YAML: the path of a key, and the line it stands in."""
+"""Places in texts of TOML and JSON: the path of a key, and the line it stands in."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
-from typing import Any
+
+from ...doors import offers
 
 # A message is made in a second.
-LONGEST, LONGEST_YAML, MOST_KEYS = 4_000_000, 500_000, 500_000
+LONGEST, MOST_KEYS = 4_000_000, 500_000
 # Tables of a case are three levels deep, rows of numbers two more. Deeper nesting only obscures a
 # message.
 DEEPEST = 16
@@ -35,12 +36,13 @@ def place(file: Path, key: str) -> str:
 
     The line is that of the closest table around it, if the file has no such key.
     """
-    keys = {".toml": keys_of, ".json": keys_of, ".yaml": _keys_of_yaml, ".yml": _keys_of_yaml}
-    read, line = keys.get(file.suffix.lower()), 0
-    if read and key:
+    suffix, line = file.suffix.lower(), 0
+    other = offers("lines").get(suffix)
+    if key and (other or suffix in {".toml", ".json"}):
         with suppress(OSError, ValueError):
-            if file.stat().st_size <= (LONGEST if read is keys_of else LONGEST_YAML):
-                line = line_of(key, read(file.read_text("utf-8-sig")))
+            if file.stat().st_size <= LONGEST:
+                text = file.read_text("utf-8-sig")
+                line = line_of(key, other.load()(text) if other else keys_of(text))
     return f"line {line}: {key}" if line else key
 
 
@@ -116,25 +118,3 @@ def _name(token: str) -> str:
     with suppress(ValueError):
         return json.loads(token) if token[0] == '"' else token.strip("'")
     return token
-
-
-def _keys_of_yaml(text: str) -> Iterator[tuple[str, int]]:
-    """Yield the path of each key and item of a YAML text, with its line; nothing without PyYAML."""
-    try:
-        import yaml
-    except ImportError:
-        return
-    untyped: Any = yaml
-    with suppress(RecursionError, yaml.YAMLError):
-        yield from _keys_below("", untyped.compose(text, yaml.BaseLoader))
-
-
-def _keys_below(path: str, node: Any) -> Iterator[tuple[str, int]]:
-    found: list[tuple[str, Any, Any]] = []
-    if node and node.id == "mapping":
-        found = [(join(path, str(key.value)), key, value) for key, value in node.value]
-    elif node and node.id == "sequence":
-        found = [(f"{path}[{k}]", value, value) for k, value in enumerate(node.value)]
-    for below, key, value in found:
-        yield below, key.start_mark.line + 1
-        yield from _keys_below(below, value)

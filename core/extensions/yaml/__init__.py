@@ -2,4 +2,4 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__)
+EXTENSION = Extension(__name__, lines={".yaml": "reading:keys_of", ".yml": "reading:keys_of"})

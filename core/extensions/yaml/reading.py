@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, cast
 
 from ...case.io.document import check_values, fault, shown
+from ...case.io.lines import join
 
 INSTALL = "pip install 'kincheck[yaml]'"
 
@@ -61,3 +64,27 @@ def parse_yaml(file: Path, text: str) -> Any:
     except (yaml.YAMLError, ValueError) as error:
         what = " ".join(str(error).split())
     raise fault(file, "", f"not valid YAML: {what}; correct the syntax") from None
+
+
+def keys_of(text: str) -> Iterator[tuple[str, int]]:
+    """Yield the path of each key and item of a YAML text, with its line; nothing without PyYAML."""
+    if len(text) > LONGEST:
+        return
+    try:
+        import yaml
+    except ImportError:
+        return
+    untyped: Any = yaml
+    with suppress(RecursionError, yaml.YAMLError):
+        yield from _keys_below("", untyped.compose(text, yaml.BaseLoader))
+
+
+def _keys_below(path: str, node: Any) -> Iterator[tuple[str, int]]:
+    found: list[tuple[str, Any, Any]] = []
+    if node and node.id == "mapping":
+        found = [(join(path, str(key.value)), key, value) for key, value in node.value]
+    elif node and node.id == "sequence":
+        found = [(f"{path}[{k}]", value, value) for k, value in enumerate(node.value)]
+    for below, key, value in found:
+        yield below, key.start_mark.line + 1
+        yield from _keys_below(below, value)
