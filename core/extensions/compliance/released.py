@@ -36,7 +36,7 @@ def released(mechanism: Mechanism) -> Mechanism:
     }
     for name in soft & set(needed):
         raise MechanismError(
-            f"{needed[name]} needs joint {name!r}, which gives way to its bushings; put it on"
+            f"{needed[name]} needs joint {name!r}, which gives way to its bushings. Put it on"
             " another joint, or remove the bushings",
             f"joints.{name}.bushings",
         )

@@ -284,7 +284,7 @@ def bushings_in(file: Path, *tables: str) -> Section:
         return root
     except CaseError as error:
         raise CaseError(
-            f"{error}; --bushings takes TOML, [bushings.ROLE] as kincheck templates NAME --bushings"
+            f"{error}. --bushings takes TOML, [bushings.ROLE] as kincheck templates NAME --bushings"
             " prints, or [joints.NAME.bushings.X]"
         ) from None
 
@@ -307,7 +307,7 @@ def with_bushings(case: Case, file: Path, *tables: str) -> Case:
     if not found:
         raise root.at("joints").fault(
             "found no bushing, expected tables [joints.NAME.bushings.X], or, for a table of"
-            " hardpoints, [bushings.ROLE]; add one"
+            " hardpoints, [bushings.ROLE]. Add one"
         )
     bushings = (*case.mechanism.bushings, *found)
     with root.at("joints").explained():
