@@ -20,7 +20,7 @@ from pathlib import Path
 from kincheck.core.cli.main import main as kincheck
 from PIL import Image
 
-from tests.support.browser import CHROMIUM, Browser
+from tests.support.browser import CHROMIUM, Browser, chromium
 
 FILM = Path(__file__).parent.parent / ".github" / "tour.webp"
 WINDOW = 1400, 900  # [px], of which the frames are made smaller
@@ -197,12 +197,11 @@ def write(film: Path) -> None:
     """Go through the steps and write the film."""
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         write_table()
-        browser = Browser(Path("profile"), WINDOW)
-        try:
+        with chromium(Path("profile")) as host, served() as address:
+            browser = Browser(host)
+            browser.resize(*WINDOW)
             browser("Emulation.setScrollbarsHidden", hidden=True)
-            with served() as address:
-                first, *others = frames(browser, address)
-        finally:
+            first, *others = frames(browser, address)
             browser.close()
     first.save(
         film, save_all=True, append_images=others, duration=[*TIMES], loop=0, quality=70, method=6

@@ -2,7 +2,6 @@
 
 import gc
 import os
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from kincheck.core.cli import main as cli
 from kincheck.core.harness import execution, provenance
 from kincheck.core.harness.provenance import truth_of
 
+from .support import browser
 from .support.fakes import Fake, crank
 
 # For the workers of pytest-xdist, which inherit it: two threads each on two processors wait for
@@ -44,19 +44,42 @@ def pytest_collection_finish():
     gc.freeze()
 
 
-@pytest.fixture(autouse=True)
-def no_recent_models(request):
-    """Empty the caches before and after a test that changes code, so that no other test sees its
-    models.
+class Changes(pytest.MonkeyPatch):
+    """Changes of a test, which empty the caches with changed code and after it, so that no other
+    test sees its models.
 
     Other tests share models: without that the suite takes a tenth more.
     """
-    changes = "monkeypatch" in request.fixturenames
-    if changes:
+
+    is_code = False
+
+    def setattr(self, *given, **more):
+        self.is_code = True
         clear_caches()
-    yield
-    if changes:
+        super().setattr(*given, **more)
+
+    def setenv(self, *given, **more):
+        self.is_code = True  # it can say where machine code is kept
         clear_caches()
+        super().setenv(*given, **more)
+
+    def undo(self):
+        super().undo()
+        if self.is_code:
+            clear_caches()
+
+
+@pytest.fixture
+def monkeypatch():
+    with Changes.context() as patch:
+        yield patch
+
+
+@pytest.fixture
+def patch():
+    """Changes that are no code of models: the caches stay."""
+    with pytest.MonkeyPatch.context() as patch:
+        yield patch
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -93,6 +116,25 @@ def cluster(monkeypatch):
         yield found
 
 
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory):
+    """Where one Chromium listens for all tests, each with a page of its own."""
+    if browser.CHROMIUM is None:
+        pytest.skip("chromium is not installed")
+    with browser.chromium(tmp_path_factory.mktemp("chromium")) as host:
+        yield host
+
+
+@pytest.fixture(name="browser")
+def page_of_browser(chromium):
+    """A page in a browser; anything on its console is a failure."""
+    page = browser.Browser(chromium)
+    yield page
+    complaints = page.complaints()
+    page.close()
+    assert complaints == []
+
+
 @pytest.fixture
 def path(tmp_path):
     """The file of a history."""
@@ -100,37 +142,41 @@ def path(tmp_path):
 
 
 @pytest.fixture
-def own_joint_types(monkeypatch):
+def own_joint_types(patch):
     """Joint types that a test makes are forgotten after it."""
-    monkeypatch.setattr(Joint, "registry", dict(Joint.registry))
+    patch.setattr(Joint, "registry", dict(Joint.registry))
 
 
 @pytest.fixture
 def in_folder(monkeypatch):
     """In the folder of the joint types of users, as a user is."""
     monkeypatch.chdir(Path(__file__).parent / "user_joints")
-    monkeypatch.setattr("sys.path", ["", *sys.path])
+    monkeypatch.syspath_prepend("")
 
 
 @pytest.fixture
-def kincheck_main(monkeypatch):
-    """main() with the cases and engines of the test; its first argument may hold several words."""
+def kincheck_main():
+    """main() with the cases and engines of the test; its first argument may hold several words.
+
+    These are no code of models: each call has a patch of its own, so that the caches stay.
+    """
 
     def main(*argv, engines=(NATIVE,), cases=None, jobs="0"):
         cases = {"crank": crank(), "crank_two": crank("crank_two")} if cases is None else cases
         by_name = {engine.name: engine for engine in engines}
-        monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
-        monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
-        monkeypatch.setattr(kincheck.adapters, "SIMULATIONS", {})
-        monkeypatch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, NATIVE))
-        monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
-        monkeypatch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
-        about = {name: (truth_of(case), case.source) for name, case in cases.items()}
-        monkeypatch.setattr(kincheck.cases, "summary", about.__getitem__)
-        # in this process, to which fakes with answers of their own belong; isolation has a room of
-        # its own
-        first, *others = argv
-        words = [*first.split(), *map(str, others)]
-        return cli.main([*words, *(["--jobs", jobs] if words[0] == "run" and jobs else [])])
+        with pytest.MonkeyPatch.context() as patch:
+            patch.delenv("KINCHECK_HISTORY", raising=False)
+            patch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
+            patch.setattr(kincheck.adapters, "SIMULATIONS", {})
+            patch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, NATIVE))
+            patch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
+            patch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
+            about = {name: (truth_of(case), case.source) for name, case in cases.items()}
+            patch.setattr(kincheck.cases, "summary", about.__getitem__)
+            # in this process, to which fakes with answers of their own belong; isolation has a room
+            # of its own
+            first, *others = argv
+            words = [*first.split(), *map(str, others)]
+            return cli.main([*words, *(["--jobs", jobs] if words[0] == "run" and jobs else [])])
 
     return main

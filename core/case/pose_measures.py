@@ -20,9 +20,8 @@ from enum import StrEnum
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..algebra import Vec3, X, Y, cross, quat, root, triple, vec, where_larger
+from ..algebra import Scalar, Vec3, X, Y, cross, is_array, quat, root, triple, vec, where_larger
 from ..errors import MechanismError, unknown
 from ..jet import Jet, arctan2, choose, norm, sqrt
 from ..joints.base import triad, unit
@@ -67,12 +66,13 @@ def smallest(e: Sequence[Jet], within: float = 0.0) -> list[Jet]:
     Args:
         within: a rotation that is larger by no more than this keeps its sign [rad].
     """
-    return with_signs(np.where(floats(e)[0] < -0.5 * within, -1.0, 1.0), e)
+    # |e0 - 1| is larger where e0 is below -within / 2
+    return with_signs(where_larger(e[0].x - 1.0, 1.0 + 0.5 * within, -1.0, 1.0), e)
 
 
-def with_signs(sign: Array, e: Sequence[Jet]) -> list[Jet]:
+def with_signs(sign: Scalar, e: Sequence[Jet]) -> list[Jet]:
     """Return Euler parameters with another sign at the samples."""
-    return [sign * each for each in e]
+    return [each * sign for each in e]
 
 
 def floats(e: Sequence[Jet]) -> Array:
@@ -92,28 +92,17 @@ def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
     """Return axis times angle [rad] of Euler parameters of about half a turn at most."""
     e0, *along = e
     square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
-    # exact numbers, which are objects, have digits enough for the quotient
-    rounded = np.asarray(square.x).dtype != object
-    small = (floats([square])[0] < _SMALL) & (floats([e0])[0] > 0.0) & rounded
-    size = sqrt(_select(small.astype(int), [square, e0 * e0]))  # any number where it is small
+    size = sqrt(square)
     quotient = 2.0 * arctan2(size, e0) / size
-    series, coefficient = 0.0 * square, 2.0
-    power = 0.0 * square + 1.0
+    series, coefficient, power = 0.0 * square, 2.0, 0.0 * square + 1.0
     for k in range(_TERMS):  # of 2 arcsin(r) / r
         series = series + coefficient * power
         power = power * square
         coefficient *= (2 * k + 1) ** 2 / ((2 * k + 2) * (2 * k + 3))
-    factor = _select(small.astype(int), [quotient, series])
+    # exact numbers, which are objects, have digits enough for the quotient
+    exact = is_array(square.x) and square.x.dtype == object
+    factor = choose(square.x, 0.0 if exact else _SMALL, quotient, series)
     return [factor * each for each in along]
-
-
-def _select(which: NDArray[Any], jets: Sequence[Jet]) -> Jet:
-    """Return the jet that is chosen in each lane, by its index."""
-
-    def pick(order: str) -> Any:
-        return np.choose(which, [getattr(jet, order) for jet in jets])
-
-    return Jet(*(pick(order) for order in ("x", "v", "a")))
 
 
 NAMES: Mapping[str, str] = {

@@ -83,7 +83,7 @@ def unsound(record: Record) -> str:
 
 def account(record: Record) -> str:
     """Return the facts of a record beside its errors: what was solved and how well, the reasons for
-    what is not known, times, and its reference.
+    what is not known, times, its reference, and the sense of its outputs.
     """
     numbers = {
         "residual": record.residual_max,
@@ -100,10 +100,12 @@ def account(record: Record) -> str:
         times = msgspec.structs.asdict(record.seconds).items()
         said += [f"{name} {number(value)} s" for name, value in times if value is not None]
     if (own := record.evidence) is not None:
-        given = own.citation, own.signs, own.grid, *own.limits.values()
+        units = (f"{name} [{unit}]" for name, unit in own.units.items())
+        given = own.citation, own.signs, own.grid, *own.limits.values(), *units
         said += [
             f"reference {', '.join(filter(None, given)) or 'uncited'} ({own.of} {own.sha256[:12]})"
         ]
+    said += [f"{name}: {each.sense}" for name, each in record.outputs.items() if each.sense]
     return "; ".join(said)
 
 

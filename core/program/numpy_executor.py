@@ -273,25 +273,32 @@ class NumpyExecutor:
         """Return the number of vector groups that hold so many lanes."""
         return 1
 
-    def parts(self, parts: Parts) -> Callable[[int], object]:
+    def parts(self, parts: Parts) -> Callable[[int, int], object]:
         """Return a call that attempts the parts of a large mechanism in order, on the current
         values of their arrays.
 
-        Its argument is the number of groups; each lane is attempted alone.
+        Its arguments are a solved lane, whose values carried slots of each part take before, -1 for
+        none; and the number of groups. Each lane is attempted alone.
         """
         plan, block = self.plan, self.block
+        solved, given = map(plan.fixed_from, (plan.kept, plan.sampled))
 
-        def call(groups: int) -> None:
+        def call(lane: int, groups: int) -> None:
             for member, sources in zip(parts.members.tolist(), parts.taken, strict=True):
-                block[list(plan.fixed)] = parts.fixed[member, :, None]
+                row, own = parts.base + member * len(plan.kept), parts.fixed[member]
+                if lane >= 0:
+                    for k, to in solved:
+                        own[to] = parts.world[row + k, lane]
+                    for k, to in given:
+                        own[to] = parts.samples[k, lane]
+                if not groups:
+                    continue
+                block[list(plan.fixed)] = own[:, None]
                 block[list(plan.sampled)] = parts.samples
                 block[list(plan.taken)] = parts.world[sources]
                 self.attempt()
-                row = parts.base + member * len(plan.kept)
                 parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
                 self._worsen(parts.worst)
-                for slot, k in plan.fixed_targets:
-                    parts.ahead[member, k] = block[slot, -1]
 
         return call
 

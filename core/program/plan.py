@@ -96,11 +96,10 @@ class Plan:
         """Carried slots for lanes not predicted by `predict`."""
         return self.continued or self.carried
 
-    @property
-    def fixed_targets(self) -> Sequence[tuple[int, int]]:
-        """Carried slots with a fixed target, and its position in `fixed`."""
+    def fixed_from(self, slots: Sequence[int]) -> list[tuple[int, int]]:
+        """Return positions of carried slots among these, and of their targets in `fixed`."""
         place = {slot: k for k, slot in enumerate(self.fixed)}
-        return [(source, place[target]) for source, target in self.carried if target in place]
+        return [(slots.index(a), place[b]) for a, b in self.carried if a in slots and b in place]
 
     @property
     def moves(self) -> Sequence[tuple[int, int]]:
@@ -145,9 +144,7 @@ class Parts:
 
     Attributes:
         members: rows of `fixed` of these parts, in order.
-        fixed: values of `Plan.fixed`, shape (all members, fixed).
-        ahead: output: the values of `fixed` for the lanes after the last one, same shape; carried
-            slots take their source.
+        fixed: values of `Plan.fixed`, shape (all members, fixed); in and out: see `NumpyExecutor`.
         samples: values of `Plan.sampled`, shape (sampled, room).
         taken: rows of the world that `Plan.taken` read, shape (parts, taken).
         world: all solved values, shape (rows, room); output `Plan.kept` of a member from row `base
@@ -159,7 +156,6 @@ class Parts:
 
     members: NDArray[np.int64]
     fixed: Array
-    ahead: Array
     samples: Array
     taken: NDArray[np.int64]
     world: Array

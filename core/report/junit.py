@@ -139,7 +139,7 @@ def _verdict(record: Record, output: str, deviations: Deviations, facts: Facts) 
         if off:
             return "failure", "; ".join(off)
     elif record.outcome.bad:
-        return "error", f"{record.outcome}: {record.message}"
+        return "error", f"{record.outcome.shown}: {record.message}"
     if not deviations.items():
         return "skipped", f"{Outcome.UNJUDGED.shown}: {deviations.reason}"
     return "", ""

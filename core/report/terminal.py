@@ -211,13 +211,3 @@ def deliver(
 def join_names(names: Sequence[str]) -> str:
     """Return the names as one text."""
     return ", ".join(names) or "none"
-
-
-def _time(seconds: float) -> str:
-    """Return a time as text with at most two units."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -12,9 +12,10 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.case.models.files import load
 from kincheck.core.extensions.hardpoints.rows import MOST_LINES
+from kincheck.core.extensions.trees import tree
 from kincheck.core.extensions.trees.reader import read_tree
-from kincheck.core.extensions.trees.tree import MOST_TIES
-from kincheck.core.extensions.xml.element import DEEPEST, MOST_ELEMENTS, parse_xml
+from kincheck.core.extensions.xml import element
+from kincheck.core.extensions.xml.element import DEEPEST, parse_xml
 
 from ..support.case_texts import complains, refused, write
 from ..support.model_files import driven
@@ -89,8 +90,13 @@ GAPS = {
 }
 
 
+@pytest.fixture
+def fewer_rows(monkeypatch):
+    monkeypatch.setattr(table, "MOST_ROWS", 10_000)
+
+
 @pytest.mark.parametrize(("rows", "said"), GAPS.values(), ids=GAPS)
-def test_blank_rows_and_cells_are_counted(rows, said, tmp_path, monkeypatch):
+def test_blank_rows_and_cells_are_counted(rows, said, tmp_path, monkeypatch, fewer_rows):
     """openpyxl makes them up: a row for each number, and a cell for each column."""
     read = Counter[str]()
     sheet = openpyxl.worksheet._read_only.ReadOnlyWorksheet
@@ -107,7 +113,7 @@ def test_blank_rows_and_cells_are_counted(rows, said, tmp_path, monkeypatch):
     assert read["cells"] <= table.MOST_CELLS + 16_384
 
 
-def test_sheet_with_gap_is_read(tmp_path):
+def test_sheet_with_gap_is_read(tmp_path, fewer_rows):
     last = f'<row r="{table.MOST_ROWS}"><c r="A1"><v>2</v></c></row>'.encode()
     (sheet,) = table.read_sheets(book(tmp_path, SHEET, HEAD + ONE + last + END), None, 10)
     assert [row for _, row in sheet.sheet] == [[1.0], [2.0]]
@@ -125,13 +131,14 @@ def test_table_of_many_lines_is_refused(tmp_path):
     complains(file, f"found {MOST_LINES + 1} lines", Supplied())
 
 
-def test_xml_elements_up_to_limit(tmp_path):
+def test_xml_elements_up_to_limit(tmp_path, monkeypatch):
     """The first one beyond it is named; there is one on each line."""
-    text = "<a>\n" + "<b/>\n" * MOST_ELEMENTS + "</a>"
+    monkeypatch.setattr(element, "MOST_ELEMENTS", most := 100)
+    text = "<a>\n" + "<b/>\n" * most + "</a>"
     file = tmp_path / "model.xml"
-    refused(lambda: parse_xml(file, text), f"line {MOST_ELEMENTS + 1}: <b>: found more than")
+    refused(lambda: parse_xml(file, text), f"line {most + 1}: <b>: found more than")
     fewer = text.replace("<b/>\n", "", 1)
-    assert len(parse_xml(file, fewer).children) == MOST_ELEMENTS - 1
+    assert len(parse_xml(file, fewer).children) == most - 1
 
 
 BODIES = """<mujoco><worldbody><body name="a"><joint name="j"/></body><body name="b"><joint/></body>
@@ -151,10 +158,11 @@ TIES = {
 
 
 @pytest.mark.parametrize("name", TIES)
-def test_closures_up_to_limit(name, tmp_path):
+def test_closures_up_to_limit(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(tree, "MOST_TIES", most := 60)
     text, tie = TIES[name]
-    file = write(tmp_path, text.format(tie * (MOST_TIES + 1)), name)
-    complains(file, f"line {MOST_TIES + 3}:  ... found more than", driven("j:0:1"))
+    file = write(tmp_path, text.format(tie * (most + 1)), name)
+    complains(file, f"line {most + 3}:  ... found more than", driven("j:0:1"))
 
 
 def test_long_chain_of_fixed_links(tmp_path):
@@ -178,9 +186,9 @@ def test_deeply_nested_mjcf_bodies(tmp_path):
         f"{'</frame></body>' * 1200}</worldbody></mujoco>"
     )
     (tmp_path / "more.xml").write_text("<mujocoinclude><option/></mujocoinclude>")
-    tree = read_tree(file, ["option"])
-    assert len(tree.moves) == 1200
-    assert tree.sites["tip"][1].at == Vec3(1200.0, 0.0, 0.0)
+    found = read_tree(file, ["option"])
+    assert len(found.moves) == 1200
+    assert found.sites["tip"][1].at == Vec3(1200.0, 0.0, 0.0)
 
 
 def test_many_linkages_of_few_digits(tmp_path):

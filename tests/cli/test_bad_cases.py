@@ -107,14 +107,12 @@ def test_unknown_case_and_engine_are_reported(kincheck_main, capsys):
     assert RIGHT.solves == 0
 
 
-def test_invalid_built_in_case_is_reported(kincheck_main, capsys, monkeypatch):
+def test_invalid_built_in_case_is_reported(capsys, monkeypatch):
     def load(name):
         raise CaseError("crank.toml: sweep.steps = 0: expected at least 1")
 
-    status = kincheck_main("run crank", cases={"crank": crank()})
-    assert status == 0
+    monkeypatch.setattr(kincheck.cases, "names", lambda: ("crank",))
     monkeypatch.setattr(kincheck.cases, "load", load)
-    capsys.readouterr()
     assert main(["run", "crank"]) == 2
     assert capsys.readouterr().err == "kincheck: crank.toml: sweep.steps = 0: expected at least 1\n"
 

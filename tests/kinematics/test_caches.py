@@ -1,5 +1,6 @@
 """One mechanism solved again and again is made ready once."""
 
+import pathlib
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -9,14 +10,20 @@ from weakref import WeakSet
 
 import numpy as np
 import pytest
-from kincheck.core import Spherical, solve, solve_designs
+from kincheck.core import Spherical, Supplied, solve, solve_designs
 from kincheck.core.caches import KEYS, ThreadCache, cache_last, clear_caches
+from kincheck.core.case import quantity
+from kincheck.core.case.models.files import load
+from kincheck.core.case.quantity import Output
 from kincheck.core.extensions.blocks import component_lanes, sparse_lanes
 from kincheck.core.extensions.blocks import sweep as block_sweep
+from kincheck.core.extensions.hardpoints.suspension import base, wheel
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.extensions.laboratory.bench.size import circle
 from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled import routes as samples
 from kincheck.core.kinematics.compiled.compiled_model import source_files
+from kincheck.core.kinematics.compiled.request import Request, WantedOutput
 from kincheck.core.kinematics.continuation import walk
 from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
@@ -334,3 +341,44 @@ def test_program_cache_key_covers_modules():
     traced = {file for name, file in loaded.items() if not name.startswith(layers)}
     assert len(traced) > 50
     assert traced <= {str(file) for file in source_files()}
+
+
+class Foreign(Output):
+    """An output of the user."""
+
+
+def wanted(kind):
+    """A wanted output of the strut, of a class."""
+    return WantedOutput(kind("wheel_x", "wheel", (1.0, 0.0, 0.0), True, 1e-9, 0.0, "test"))
+
+
+def test_program_cache_key_covers_equations(tmp_path, monkeypatch):
+    """Programs of varied places with outputs are found again; not after a change of a file beside
+    the output's, and those of an output of the user never.
+    """
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    traced = calls(monkeypatch, compiled_model, "_trace")
+
+    def trace(kind):
+        moved = ("points.wheel.position",)
+        request = Request(("stroke",), (), order=0, varied=moved, outputs=(wanted(kind),))
+        compiled_model.load_or_trace(mcpherson(), request)
+        return len(traced)
+
+    assert [trace(Output) for _ in range(3)] == [1, 1, 1]
+    assert [trace(Foreign) for _ in range(2)] == [2, 3]
+    folders, source = list[str](), compiled_model._source
+    changed = lambda *given: (folders.extend(given), source(*given) + b"new")[1]  # noqa: E731
+    monkeypatch.setattr(compiled_model, "_source", changed)
+    assert trace(Output) == 4
+    assert str(pathlib.Path(quantity.__file__).parent) in folders
+
+
+def test_modules_of_suspension_outputs(tmp_path):
+    """Those of an output that another one is made of, too: the slope by travel of toe."""
+    file = tmp_path / "car.csv"
+    file.write_text(sample_table(TEMPLATES["double_wishbone"]))
+    case = load(file, Supplied(travel="0.02:3"))
+    (slope,) = [each for each in case.outputs if each.name == "toe.per_travel"]
+    found = compiled_model.modules_of([WantedOutput(slope)])
+    assert {wheel.__name__, base.__name__, quantity.__name__} <= found

@@ -35,7 +35,7 @@ from kincheck.core.history.findings import (
 from kincheck.core.report import junit, regressions, report, sections, table
 from rich.console import Console
 
-from ..support.planted import missing, text_of_page
+from ..support.planted import missing, text_of_page, unfilled
 from ..support.strut_results import results
 
 replace = msgspec.structs.replace
@@ -73,11 +73,42 @@ def unexplained(found, exempt):
     return sorted(lacking.difference(*excused.values())), needless
 
 
+def filled(record):
+    """The record with all that a record may say."""
+    found = {
+        name: replace(each, sense="outward is positive", acceleration=[0.5] * len(each.position))
+        for name, each in record.outputs.items()
+    }
+    errors = {
+        name: replace(
+            each, acceleration=replace(each.position, max_abs=7.7e-7), lost=3, contradicted=2
+        )
+        for name, each in record.errors.items()
+    }
+    evidence = replace(
+        record.evidence,
+        units={"half_track_change": "inch"},
+        signs="outward",
+        grid="3 of 21 samples",
+        limits={"half_track_change": "0.1 mm of reading"},
+    )
+    return replace(
+        record,
+        outputs=found,
+        errors=errors,
+        evidence=evidence,
+        seconds=replace(record.seconds, compare=0.3, waited=0.4),
+        faults=["balance of power off by 3 W"],
+        table={"length": "mm"},
+    )
+
+
 def a_run():
     """A run with every outcome, notes, signs, reasons, and pairs that were not run."""
     run = results()
     native, one, two = run.records
-    native = replace(native, message="passes a singular pose", reasons={"rank": "it has none"})
+    native = replace(filled(native), message="passes a pose", reasons={"rank": "it has none"})
+    one = filled(one)
     more = [
         replace(two, engine=each, outcome=outcome, message=f"{each} says why")
         for each, outcome in (("three", Outcome.ERROR), ("four", Outcome.UNSUPPORTED))
@@ -100,8 +131,9 @@ def a_run():
         difference=2.5e-3,
         tolerance=1e-9,
         unit="m",
+        outputs={"half_track_change": ["velocity"]},
         explanations=[explained],
-        unexplained=[],
+        unexplained=["wheelbase_change"],
         message="the reference is off; with another sign it fits",
     )
     about = {"cases": {"strut": facts, "other": {}}, "missing": [["other", "five", "projection"]]}
@@ -120,15 +152,22 @@ OF_RUN = [
     (r"run\.(kincheck|tol|engines|cases\.source).*", "terminal junit", "of all records: the page"),
     (r"run\.cases\.driver\..*", "terminal junit page", "the description of the case"),
     (r".*\.truth", "junit", "each error names its standard"),
-    (r".*\.(driver|details|settings)\..*", "terminal junit page", "curves and programs"),
-    (r"(.*\.outputs|references)\.(position|velocity|unit)", "terminal junit", "curves"),
+    (r".*\.(driver|details|settings|table)\..*", "terminal junit page", "curves and programs"),
+    (
+        r"(.*\.outputs|references)\.(position|velocity|acceleration|unit)",
+        "terminal junit",
+        "curves",
+    ),
+    (r".*\.outputs\.sense", "page", "once for each case"),
+    (r".*\.(faults|errors\.(lost|contradicted))", "terminal junit page", "in the message"),
+    (r".*\.seconds\.(compare|waited)", "page", "the time of a sample is without them"),
     (r"(.*\.outputs|references)\.reason", "terminal junit page", "in the reason of its errors"),
     (r".*\.errors\.\w+\.rms", "terminal page", "the largest error judges"),
     (r".*\.errors\.\w+\.(worst_step|against)", "terminal", "in the message of what fails"),
     (r".*\.evidence\.sha256", "terminal junit", "its first digits"),
     (r"records\.<one>\.(truth|evidence\..*)", "page", "once for each case"),
     (r"suspects\.(?!message).*", "terminal junit page", "in the message"),
-    (r"records\.<(two|three|four)>\..*", "terminal junit page", "solved nothing: their message"),
+    (r"records\.<(two|three|four)>\.(?!message).*", "terminal junit page", "solved nothing"),
 ]
 
 
@@ -140,7 +179,15 @@ def test_run_reaches_every_form(tmp_path):
         "page": lambda result: page_of_run(result, tmp_path),
     }
     ours = ("strut", "other", "half_track_change", "wheelbase_change")
-    assert unexplained(missing(a_run(), forms, ours), OF_RUN) == ([], [])
+    run = a_run()
+    assert unfilled(run) == {"Results.scenes"}
+    assert unexplained(missing(run, forms, ours), OF_RUN) == ([], [])
+    for outcome in Outcome:
+        if not outcome.judged:
+            last = replace(run.records[-1], outcome=outcome)
+            changed = replace(run, records=[*run.records[:-1], last])
+            for name, form in forms.items():
+                assert (outcome.value if name == "json" else outcome.shown) in form(changed)
 
 
 def table_of(tmp_path, name="a.csv", *changes):

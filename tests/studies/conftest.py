@@ -6,14 +6,14 @@ from kincheck.core.studies.checks import manifold as branches
 
 
 @pytest.fixture
-def few(monkeypatch):
+def few(patch):
     """One specimen, few starts of Newton's iteration, and few aims of the walks from their ends."""
-    monkeypatch.setattr(check_joint, "SPECIMENS", 1)
-    monkeypatch.setattr(check_joint, "STARTS", 10)
-    monkeypatch.setattr(branches, "AIMS", 4)
+    patch.setattr(check_joint, "SPECIMENS", 1)
+    patch.setattr(check_joint, "STARTS", 10)
+    patch.setattr(branches, "AIMS", 4)
 
 
 @pytest.fixture
-def loops_only(few, monkeypatch):
+def loops_only(few, patch):
     """The same without the search for branches, half of the work."""
-    monkeypatch.setattr(check_joint, "branches", lambda one, starts: [])
+    patch.setattr(check_joint, "branches", lambda one, starts: [])

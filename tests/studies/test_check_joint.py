@@ -51,14 +51,14 @@ WITHOUT_EQUIVALENT = ("bowl", "point_on_parabola", "line_no_twist", "torus")
 pytestmark = pytest.mark.usefixtures("own_joint_types")
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize("name", sparse_by_day(BUILT_IN, 3))
 def test_check_joint_passes_builtin_joints(few, name):
     report = check_joint(Joint.registry[name], samples=8)
     assert report.passed, report
     assert len({each.check for each in report.findings}) == len(report.findings)
 
 
-@pytest.mark.parametrize("module", USERS)
+@pytest.mark.parametrize("module", sparse_by_day(USERS, 2))
 def test_check_joint_passes_user_joints(few, in_folder, module):
     engines = [adapters.engine(name) for name in adapters.ENGINES]
     report = check_joint(load_joint(f"{module}:{USERS[module]}"), samples=8, engines=engines)

@@ -6,6 +6,8 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Thread
 from time import monotonic, sleep
@@ -37,43 +39,44 @@ HELPERS = """
 """  # noqa: E501
 
 
-class Browser:
-    """A headless browser with real mouse and key events, by the Chrome DevTools Protocol
-    (https://chromedevtools.github.io/devtools-protocol/).
-    """
-
-    def __init__(self, folder: Path, size: tuple[int, int] = (1400, 1000), *, dark: bool = False):
-        command = [str(CHROMIUM), *FLAGS, "--remote-debugging-port=0", f"--user-data-dir={folder}"]
-        self.process = subprocess.Popen(
-            [*command, "about:blank"], stderr=subprocess.PIPE, text=True
-        )
-        assert self.process.stderr is not None
+@contextmanager
+def chromium(folder: Path) -> Iterator[str]:
+    """Run a headless Chromium with its profile in a folder; yields where it listens."""
+    command = [str(CHROMIUM), *FLAGS, "--remote-debugging-port=0", f"--user-data-dir={folder}"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
         host = next(
             found[1]
-            for line in self.process.stderr
+            for line in process.stderr
             if (found := re.search(r"listening on ws://([^/]+)/", line))
         )
         # a full pipe would stop it
-        self.reader = Thread(target=self.process.stderr.read, daemon=True)
-        self.reader.start()
-        pages: list[dict[str, str]] = []
-        while not pages:
-            with urlopen(f"http://{host}/json") as listed:
-                pages = [page for page in json.load(listed) if page["type"] == "page"]
-        self.link = connect(pages[0]["webSocketDebuggerUrl"], max_size=None)
-        self.socket = self.link.__enter__()
+        reader = Thread(target=process.stderr.read, daemon=True)
+        reader.start()
+        yield host
+        process.terminate()
+        reader.join()
+
+
+class Browser:
+    """A page of its own in a running Chromium, without the data of others, and with real mouse and
+    key events, by the Chrome DevTools Protocol (https://chromedevtools.github.io/devtools-protocol/).
+    """
+
+    def __init__(self, host: str):
+        with urlopen(f"http://{host}/json/version") as told:
+            address = json.load(told)["webSocketDebuggerUrl"]
         self.count, self.events = 0, list[dict[str, Any]]()
+        self.links = ExitStack()
+        self.socket = self.whole = self.links.enter_context(connect(address, max_size=None))
+        self.context = self("Target.createBrowserContext")["browserContextId"]
+        page = self("Target.createTarget", url="about:blank", browserContextId=self.context)
+        own = connect(f"ws://{host}/devtools/page/{page['targetId']}", max_size=None)
+        self.socket = self.links.enter_context(own)
         for domain in ("Page", "Runtime", "Log"):
             self(f"{domain}.enable")
-        width, height = size
-        self(
-            "Emulation.setDeviceMetricsOverride",
-            width=width,
-            height=height,
-            deviceScaleFactor=1,
-            mobile=False,
-        )
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.resize(1400, 1000)
+        scheme = {"name": "prefers-color-scheme", "value": "light"}
         self("Emulation.setEmulatedMedia", features=[scheme])
 
     def __call__(self, method: str, **given: Any) -> dict[str, Any]:
@@ -86,6 +89,16 @@ class Browser:
                 assert "error" not in message, (method, message)
                 return message["result"]
             self.events.append(message)
+
+    def resize(self, width: int, height: int) -> None:
+        """Change the size of the window [px]."""
+        self(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
 
     def violations(self) -> list[list[str]]:
         """Return what axe finds on the page."""
@@ -189,10 +202,7 @@ class Browser:
         return [json.dumps(each) for each in self.events if each.get("method") in named]
 
     def close(self) -> None:
-        """End the browser."""
-        self("Browser.close")
-        self.link.__exit__(None, None, None)
-        self.process.wait(20)
-        self.reader.join()
-        assert self.process.stderr is not None
-        self.process.stderr.close()
+        """Close the page and forget its data."""
+        self.socket = self.whole
+        self("Target.disposeBrowserContext", browserContextId=self.context)
+        self.links.close()

@@ -61,6 +61,24 @@ def missing(
     return found
 
 
+def unfilled(result: Any) -> set[str]:
+    """Return the fields of a result that are empty in all of its parts, by their class."""
+    named, filled, waiting = set[str](), set[str](), [result]
+    while waiting:
+        if isinstance(value := waiting.pop(), str):
+            continue
+        parts = _parts(value)
+        waiting += parts.values()
+        if isinstance(value, msgspec.Struct):
+            named |= {f"{type(value).__name__}.{key}" for key in parts}
+            filled |= {
+                f"{type(value).__name__}.{key}"
+                for key, each in parts.items()
+                if each is not None and each is not msgspec.UNSET and each not in ({}, [], "")
+            }
+    return named - filled
+
+
 def text_of_page(page: str) -> str:
     """Return a page as text, with the packed data of its figures."""
     packed = re.findall(r">([A-Za-z0-9+/=]{200,})<", page)

@@ -30,14 +30,15 @@ from ...kinematics.compiled.request import (
 )
 from ...kinematics.compiled.solution import Columns
 from ...kinematics.continuation.singular_poses import SOUND, Anchor, Numbers
-from ...kinematics.formulation.acceptance_criteria import is_uncertain
+from ...kinematics.formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
 from ...kinematics.formulation.constraints import frames
 from ...kinematics.formulation.state_vectors import samples
 from ...kinematics.structure.degrees_of_freedom import freedom_account
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
-from ...program import Parts, Plan
+from ...program import Parts
 from ...trajectory import QUANTITIES, Array
+from ..llvm.executor import LlvmParts, LlvmWalk
 from ..llvm.plan import aligned
 from .components import Alike, components, describe_components
 from .numbers_of import structure
@@ -79,13 +80,9 @@ class ComponentType:
 
 
 # Samples at once: all are predicted from one pose, and the farther they are from it the more
-# iterations they take, and the more are tried in vain; and what a large chain takes its time for is
-# memory: with 24 one of 200 loops takes up to 1.6 times as long. With 8 one of 16 loops takes 1.3
-# times as long.
-LANES = 16
-# Numbers of all components that stay in the second-level cache beside their programs; of more, half
-# as many samples are taken at once: a chain of 1,000 loops takes 0.7 times as long.
-CACHED = 500_000
+# iterations they take, and the more are tried in vain; a large chain takes its time for memory.
+# With 16 chains of 20 and 200 loops take as long, with 24 they take 1.2 times as long.
+LANES = 8
 BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
 STILL = 0.0, 0.0, 0.0
 
@@ -131,10 +128,10 @@ class ComponentLanes(Lanes):
                 self.kinds.append(kind)
                 rows += len(kind.members) * kind.model.kept
         self.place = {part: (kind, k) for kind in self.kinds for k, part in enumerate(kind.members)}
-        self.many = LANES if rows * LANES <= CACHED else LANES // 2
+        self.many = LANES
         self.details = self._details()
-        self._bind(rows)
         self._columns, self._rows, self._still = self._outputs()
+        self._bind(rows)
         self.design = self.anchor(0.0)
 
     def _bind(self, rows: int) -> None:
@@ -144,30 +141,34 @@ class ComponentLanes(Lanes):
         self.world[:] = 0.0
         self.worst = aligned(len(WORST) * room).reshape(-1, room)
         self._best = self.kinds[0].model.plan.best
-        self._fixed, self._ahead = ([kind.fixed.copy() for kind in self.kinds] for _ in range(2))
+        self._fixed = [kind.fixed.copy() for kind in self.kinds]
         tables = {  # types without drivers share one
             kind.drivers: aligned(len(kind.model.sampled) * room).reshape(-1, room)
             for kind in self.kinds
         }
-        self._given, self._samples = tables, [tables[kind.drivers] for kind in self.kinds]
-        self._carried = [_carried_columns(kind.model.plan) for kind in self.kinds]
-        # from what is fixed now, and from what is ahead
-        self._calls: list[list[Callable[[int], object]]] = [[], []]
+        self._given = tables
+        self._calls: list[Callable[[int, int], object]] = []
         self._tables: list[Parts] = []  # calls know addresses, not arrays
+        self._which: list[int] = []  # the samples of each call
         kind_of = {part: k for k, kind in enumerate(self.kinds) for part in kind.members}
         for k, run in groupby(range(len(self.parts)), key=kind_of.__getitem__):
-            parts, both = [*run], (self._fixed[k], self._ahead[k])
+            parts, kind = [*run], self.kinds[k]
             members = np.array([self.place[part][1] for part in parts], dtype=np.int64)
             given = [
                 [row for body in self.parts[part].given for row in self.body_rows(body)]
                 for part in parts
             ]
             taken = np.array(given, dtype=np.int64).reshape(len(parts), -1)
-            samples, base = self._samples[k], self.kinds[k].base
-            for calls, (fixed, ahead) in zip(self._calls, (both, both[::-1]), strict=True):
-                table = Parts(members, fixed, ahead, samples, taken, self.world, base, self.worst)
-                self._tables.append(table)
-                calls.append(executors[k].parts(table))
+            given_to, fixed = tables[kind.drivers], self._fixed[k]
+            table = Parts(members, fixed, given_to, taken, self.world, kind.base, self.worst)
+            self._tables.append(table)
+            self._calls.append(executors[k].parts(table))
+            self._which.append([*tables].index(kind.drivers))
+        compiled = [call for call in self._calls if isinstance(call, LlvmParts)]
+        self._walk = None
+        if len(compiled) == len(self._calls):
+            deciding, best = (CLOSURES, SIGMAS, MARGINS), self._best.ravel()
+            self._walk = LlvmWalk(compiled, self.many, self._rows, best, deciding)
 
     def _details(self) -> dict[str, Any]:
         unknowns, rows, redundant, sizes = 0, 0, list[str](), dict[str, dict[str, int]]()
@@ -301,31 +302,38 @@ class ComponentLanes(Lanes):
             room[:, count:] = table[:, count - 1 :]
         self.worst[:] = self._best
         groups = self._groups(count)
-        for call in self._calls[0]:
-            call(groups)
+        for call in self._calls:
+            call(-1, groups)
         return self.worst[MARGINS, :count].copy()
+
+    def walk(self, tables: Sequence[Array], count: int) -> tuple[Array, Array]:
+        """See `Lanes`."""
+        if self._walk is None:
+            return super().walk(tables, count)
+        samples = [tables[k] for k in self._which]
+        # `is_uncertain` in reverse; for sure, not by rounding either
+        bound = (1.0 - 1e-12) * AMPLIFIED * self._tol / WORSE
+        moving, tests = self._walk(samples, count, (EPSILON, bound))
+        return self._motions(moving), tests
 
     def motions(self, count: int) -> Array:
         """See `Lanes`."""
-        moving = self.world[self._rows, :count]
+        return self._motions(self.world[self._rows, :count])
+
+    def _motions(self, moving: Array) -> Array:
         if len(moving) == len(self._still):
             return moving
-        found = np.repeat(self._still, count, axis=1)
+        found = np.repeat(self._still, moving.shape[1], axis=1)
         found[self._columns] = moving
         return found
 
-    def uncertain(self, count: int, path: Path) -> Mapping[int, float]:
-        """See `Lanes`: the tests tell of doubt, by estimates; whether there is reason for it, the
-        equations of the whole mechanism do.
+    def uncertain(self, doubtful: Indices, tol: float, path: Path) -> Mapping[int, float]:
+        """See `Lanes`: the doubt is by estimates; whether there is reason for it, the equations of
+        the whole mechanism tell.
         """
-        closure, sigma = (self.worst[row, :count] for row in (CLOSURES, SIGMAS))
-        if not is_uncertain(float(sigma.min()), float(closure.max()), self._tol):
-            return {}
-        at = np.flatnonzero(is_uncertain(sigma, closure, self._tol))
-        state = np.stack([self._state(k) for k in at.tolist()], axis=1)
-        sample = self._whole.sample_tables(self._times[at], path)[0]
-        errors = self._whole.error_bounds(state, sample)
-        return self.refuse_uncertain(at, errors, self._tol)
+        state = np.stack([self._state(k) for k in doubtful.tolist()], axis=1)
+        sample = self._whole.sample_tables(self._times[doubtful], path)[0]
+        return self.refuse_uncertain(doubtful, self._whole.error_bounds(state, sample), tol)
 
     @cached_property
     def _whole(self) -> SparseLanes:
@@ -378,24 +386,10 @@ class ComponentLanes(Lanes):
                 return False
         return True
 
-    def go_on(self) -> None:
-        """See `Lanes`: the values of the last lane are in place."""
-        self._fixed, self._ahead = self._ahead, self._fixed
-        self._calls.reverse()
-
     def carry(self, lane: int) -> None:
         """See `Lanes`."""
-        for kind, fixed, sample, carried in zip(
-            self.kinds, self._fixed, self._samples, self._carried, strict=True
-        ):
-            size, count = kind.model.kept, len(kind.members)
-            solved = self.world[kind.base : kind.base + size * count, lane].reshape(count, size)
-            tables = solved, sample[None, :, lane], fixed
-            values = [
-                table[:, sources] for table, (sources, _) in zip(tables, carried, strict=True)
-            ]
-            for (_, targets), each in zip(carried, values, strict=True):
-                fixed[:, targets] = each
+        for call in self._calls:
+            call(lane, 0)
 
     def failure(self, tol: float) -> PoseFailure:
         """See `Lanes`: that of its unsolved component, or of the one nearest to singular."""
@@ -410,18 +404,3 @@ class ComponentLanes(Lanes):
             sigma=sigma[worst],
             where=f"the component of {', '.join(self.parts[order[worst]].bodies)}: ",
         )
-
-
-def _carried_columns(plan: Plan) -> list[tuple[Indices, Indices]]:
-    """Return the carried columns of kept, sampled and fixed values, and their targets among the
-    fixed ones.
-    """
-    column = [
-        {slot: k for k, slot in enumerate(slots)} for slots in (plan.kept, plan.sampled, plan.fixed)
-    ]
-    found: list[tuple[list[int], list[int]]] = [([], []) for _ in column]
-    for source, target in plan.carried:
-        k = next(k for k, each in enumerate(column) if source in each)
-        found[k][0].append(column[k][source])
-        found[k][1].append(column[-1][target])
-    return [(np.array(a, np.intp), np.array(b, np.intp)) for a, b in found]

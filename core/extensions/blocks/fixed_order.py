@@ -115,12 +115,9 @@ def _fill_in(rows: NDArray[np.intp], columns: NDArray[np.intp], n: int) -> list[
 
 @cache
 def load_loops() -> Code:
-    """Return the loops, compiled if the cache has none."""
-
-    def text() -> str:
-        return "\n".join([_factor(), _sweep("gather"), _sweep("scatter"), declarations(LANES)])
-
-    return load("fixed order", text, {"factor": 10, "gather": 9, "scatter": 9})
+    """Return the loops, compiled if the cache has none of their text."""
+    text = "\n".join([_factor(), _sweep("gather"), _sweep("scatter"), declarations(LANES)])
+    return load(text, lambda: text, {"factor": 10, "gather": 9, "scatter": 9})
 
 
 VECTOR, WORDS = f"<{LANES} x double>", f"<{LANES} x i64>"

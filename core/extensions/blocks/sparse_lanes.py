@@ -30,7 +30,6 @@ from ...kinematics.formulation.acceptance_criteria import (
     Block,
     Candidate,
     Limits,
-    is_uncertain,
     known_slope,
     least_slope,
     margins,
@@ -51,7 +50,7 @@ from ...trajectory import Array
 from ..llvm.machine_code import works
 from .elements import LargeSystem
 from .sparse_lu import Blocks, FactorsOfLanes, Pattern, SingularError
-from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
+from .sweep import MARGINS, WORST, Indices, Lanes
 
 POSES = 8
 """Poses evaluated together: samples that are so far from the last one are still predicted well."""
@@ -501,13 +500,10 @@ class SparseLanes(Lanes):
         none = np.empty((0, count))
         return np.concatenate([none, *(self.outputs[k][:, :count] for k in self._vectors)])
 
-    def uncertain(self, count: int, path: Path) -> Mapping[int, float]:
+    def uncertain(self, doubtful: Indices, tol: float, path: Path) -> Mapping[int, float]:
         """See `Lanes`."""
-        found, tol = self._found, self._limits.tol
-        closure, sigma = self.worst[CLOSURES, :count], self.worst[SIGMAS, :count]
-        at = np.flatnonzero(is_uncertain(sigma, closure, tol))
-        errors = self.error_bounds(found.state[:, at], found.sample[:, at])
-        return self.refuse_uncertain(at, errors, tol)
+        state, sample = (each[:, doubtful] for each in (self._found.state, self._found.sample))
+        return self.refuse_uncertain(doubtful, self.error_bounds(state, sample), tol)
 
     def error_bounds(self, state: Array, sample: Array) -> Array:
         """Return bounds of the errors of poses [of the mechanism's size] and of their rates and

@@ -35,7 +35,7 @@ from ...kinematics.continuation.singular_poses import (
     pass_over,
 )
 from ...kinematics.continuation.walk import Walk, longest, part_of_step
-from ...kinematics.formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
+from ...kinematics.formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE, is_uncertain
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
 from ...program import ITERATIONS, MARGIN, leading
@@ -70,6 +70,11 @@ class Lanes(ABC):
     many: int
     worst: Array
     last: int = 0
+
+    @cached_property
+    def columns(self) -> Columns:
+        """The columns of the wanted motions."""
+        return Columns(self.request)
 
     def attempt(self, times: Array, path: Path) -> Array:
         """Solve all blocks at times, up to the number of lanes, each lane alone; return the margin
@@ -126,18 +131,23 @@ class Lanes(ABC):
     def carry(self, lane: int) -> None:
         """Predict from a solved lane from now on, whichever it is."""
 
-    def go_on(self) -> None:
-        """Predict from the last lane from now on."""
-        self.carry(self.last)
+    def walk(self, tables: Sequence[Array], count: int) -> tuple[Array, Array]:
+        """Follow samples as far as machine code does by itself, each certain; return the motions
+        and the tests of those followed.
+
+        Args:
+            tables: from `sample_tables`, with the last sample `many` times more.
+        """
+        return np.empty((0, 0)), np.empty((0, 0))
 
     @abstractmethod
     def motions(self, count: int) -> Array:
         """Return the wanted motions of the first lanes, shape (columns, count)."""
 
     @abstractmethod
-    def uncertain(self, count: int, path: Path) -> Mapping[int, float]:
-        """Return which of the first lanes are left uncertain by their residuals, and a bound of the
-        error of each.
+    def uncertain(self, doubtful: Indices, tol: float, path: Path) -> Mapping[int, float]:
+        """Return which of the lanes in doubt are left uncertain by their residuals, and a bound of
+        the error of each.
         """
 
     def refuse_uncertain(self, lanes: Indices, errors: Array, tol: float) -> dict[int, float]:
@@ -166,8 +176,10 @@ HALVED, MOST, FEW = 8, 64, 4
 # Samples that are interpolated at most: a fine sweep has some tens of them beside a singular pose.
 BRIDGED = 64
 
-Keep = Callable[[Indices], None]
-"""Takes samples, by their number outwards, from as many lanes."""
+Keep = Callable[[Indices, Array, Array, bool], None]
+"""Takes samples, by their number outwards, with their motions and tests. They are certain, or in
+the first lanes.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,13 +189,23 @@ class _Side:
     Attributes:
         order: their numbers.
         times: of the samples.
-        given: their inputs, see `Lanes.sample_tables`.
+        given: their inputs, see `Lanes.sample_tables`; the last one many times more.
     """
 
     path: Path
     order: Indices
     times: Array
     given: Sequence[Array]
+
+    @staticmethod
+    def of(lanes: Lanes, path: Path, order: Indices, times: Array) -> _Side:
+        """Return a side whose samples lanes walk over."""
+        tables = lanes.sample_tables(np.append(times, times[-1:].repeat(lanes.many)), path)
+        return _Side(path, order, times, tables)
+
+    def inputs(self, samples: Indices) -> list[Array]:
+        """Return the inputs of samples."""
+        return [each.take(samples, axis=1) for each in self.given]
 
 
 class BlockWalk(Walk):
@@ -219,27 +241,38 @@ class BlockWalk(Walk):
         return self.advance(0, len(self.samples))
 
     def follow(self, at: int, stop: int, parts: int) -> int:
-        """Follow as many samples at once as there are lanes, up to the first failure."""
-        lanes, ahead = self.lanes, self.samples[at : min(at + self.lanes.many, stop)]
-        self._parts = parts
+        """Follow samples as far as they need no look, or else as many at once as there are lanes,
+        up to the first failure.
+        """
+        lanes, self._parts = self.lanes, parts
         if self.watch and lanes.sound:
             self.sound = lanes.anchor(self.time)
-        first, last = int(ahead[0]), int(ahead[-1])
-        # a part of an array is much quicker than a selection
-        given = slice(first, last + 1) if last - first == len(ahead) - 1 else ahead
-        tables = [each[:, given] for each in self.side.given]
-        accepted = leading(lanes.attempt_at(tables, neighbours=True))
+        # what fails is looked at
+        if not (self.watch or parts) and (count := self._walk(self.samples[at:stop])):
+            return at + count
+        ahead = self.samples[at : min(at + lanes.many, stop)]
+        accepted = leading(lanes.attempt_at(self.side.inputs(ahead), neighbours=True))
         if not accepted:
             if lanes.sound and not self.watch:
                 self.sound = lanes.anchor(self.time)
             return at
-        self.keep(ahead[:accepted])
-        if accepted == len(ahead):
-            lanes.go_on()
-        else:
-            lanes.carry(accepted - 1)
+        self.keep(ahead[:accepted], lanes.motions(accepted), lanes.worst[:, :accepted], False)
+        lanes.carry(accepted - 1)
         self.time = float(self.side.times[ahead[accepted - 1]])
         return at + accepted
+
+    def _walk(self, ahead: Indices) -> int:
+        """Follow samples that need no look; return how many there are."""
+        first, side = int(ahead[0]), self.side
+        if first + len(ahead) == len(side.times) and first <= ahead[-1]:
+            given = [each[:, first:] for each in side.given]
+        else:
+            given = side.inputs(np.append(ahead, ahead[-1:].repeat(self.lanes.many)))
+        motions, tests = self.lanes.walk(given, len(ahead))
+        if count := tests.shape[1]:
+            self.keep(ahead[:count], motions, tests, True)
+            self.time = float(self.side.times[ahead[count - 1]])
+        return count
 
     def follow_part(self, at: int) -> PoseFailure | None:
         """Follow equal parts of a step that fails, as neighbours, and else the longest accepted
@@ -274,7 +307,7 @@ class _Run:
     """
 
     def __init__(self, lanes: Lanes, tol: float, count: int = 0) -> None:
-        self.lanes, self.tol, self.columns = lanes, tol, Columns(lanes.request)
+        self.lanes, self.tol, self.columns = lanes, tol, lanes.columns
         self.table = np.full((self.columns.count, count), np.nan)
         self.worst = np.full((len(WORST), count), np.nan)
         self.refuse_uncertain = dict[int, float]()
@@ -286,13 +319,18 @@ class _Run:
         self.messages.append(message)
         self.failures.append(failure)
 
-    def keep(self, side: _Side, samples: Indices) -> None:
-        """Keep the samples of a side that are in the first lanes."""
-        at, count = side.order[samples], len(samples)
-        self.table[:, at] = self.lanes.motions(count)
-        self.worst[:, at] = self.lanes.worst[:, :count]
-        for lane, error in self.lanes.uncertain(count, side.path).items():
-            self.refuse_uncertain[int(at[lane])] = error
+    def keep(
+        self, side: _Side, samples: Indices, motions: Array, tests: Array, certain: bool
+    ) -> None:
+        """Keep samples of a side; see `Keep`."""
+        at = side.order[samples]
+        self.table[:, at], self.worst[:, at] = motions, tests
+        if certain:
+            return
+        doubtful = np.flatnonzero(is_uncertain(tests[SIGMAS], tests[CLOSURES], self.tol))
+        if len(doubtful):
+            for lane, error in self.lanes.uncertain(doubtful, self.tol, side.path).items():
+                self.refuse_uncertain[int(at[lane])] = error
 
     def follow(
         self, side: _Side, start: Anchor, keep: Keep, *, watch: bool = False
@@ -483,10 +521,7 @@ class BlockSweep:
     def _sides(self) -> list[_Side]:
         """The samples of each side of the start, outwards."""
         path, sides = self.path, outwards(self.path.times, self.start.time)
-        return [
-            _Side(path, side, path.times[side], self._lanes.sample_tables(path.times[side], path))
-            for side in sides
-        ]
+        return [_Side.of(self._lanes, path, side, path.times[side]) for side in sides]
 
     @cached_property
     def _departure(self) -> tuple[Anchor | None, _Run]:
@@ -496,9 +531,8 @@ class BlockSweep:
         lanes, path, begin, run = self._lanes, self.path, self.start, _Run(self._lanes, CLOSED)
         lanes.solve_near(lanes.design, CLOSED)
         if way := begin.lead:
-            times = np.array([0.0, 1.0])
             lanes.set_prediction_start(0.0, way)
-            side = _Side(way, np.arange(2), times, lanes.sample_tables(times, way))
+            side = _Side.of(lanes, way, np.arange(2), np.array([0.0, 1.0]))
             run.follow(side, lanes.anchor(0.0), _keep_none)
             if run.messages:
                 run.messages[:] = [f"on the way to {begin.name}: {run.messages[0]}"]
@@ -510,5 +544,5 @@ class BlockSweep:
         return lanes.anchor(begin.time), run
 
 
-def _keep_none(samples: Indices) -> None:
+def _keep_none(samples: Indices, motions: Array, tests: Array, certain: bool) -> None:
     """Keep none of the samples."""

@@ -13,14 +13,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ...algebra import Scalar
 from ...case.case import TIME as SWEPT_TIME
 from ...case.case import Case, Quantity
 from ...case.measures import ForceMeasure, Orientation
 from ...errors import KincheckError, shortened
 from ...forces import Forces, Reaction
 from ...harness.compare import output_series
-from ...jet import Jet, arctan2, sqrt
+from ...jet import Jet
 from ...joints.base import Kind
 from ...kinematics import NativeSolver
 from ...kinematics.compiled.compiled_model import ASSEMBLING, CLOSED, Model, recent_model
@@ -43,20 +42,16 @@ from ...kinematics.continuation.segments import BETTER, NEAR, Followed
 from ...kinematics.continuation.walk import follow_samples
 from ...kinematics.formulation.acceptance_criteria import LOW
 from ...mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
-from ...program import DONE, MARGIN, Program, Tape, program, where_larger
+from ...program import DONE, MARGIN, Program, Tape, program
 from ...trajectory import QUANTITIES
 from ..designs.outputs import DesignOutputs
 from ..sweep.curves import moved_by
-from ..sweep.varied_places import Geometry
+from ..sweep.varied_places import Geometry, Moves
 
 TOL = 1e-12
 """Largest accepted residual, as of `kincheck run`."""
 HALVINGS = 40
 """Most halvings of a step in a row: its rest is no step in double precision."""
-SMALL = 1e-4
-"""Square of the sine of half an angle below which three terms of the series of an angle over its
-sine give all digits: the fourth is 35/576 of its cube.
-"""
 
 
 @dataclass(frozen=True)
@@ -295,10 +290,9 @@ def solved_case(
             " Give --forces, or add an output of the motion."
         )
     case = replace(case, outputs=measured)
-    varied, moves, units = list[str](), np.empty((0, 0)), dict[str, str]()
-    if places:
-        varied, _, moves, units = moved_by(case, places)
-    made = DesignOutputs.of(case, varied, derivative=2, bodies=bodies)
+    none = Moves({}, np.empty(0), np.empty((0, 0)))
+    varied, units = moved_by(case, places) if places else (none, dict[str, str]())
+    made = DesignOutputs.of(case, varied.places, derivative=2, bodies=bodies)
     route = made.designs.route
     if route.begin.lead is not None:
         raise KincheckError(
@@ -308,7 +302,7 @@ def solved_case(
     model, kept = route.model, len(route.model.slots) + 2
     geometry, parameters = Geometry(case), list[Parameter]()
     for k, (name, unit) in enumerate(units.items()):
-        moved = {model.geometry[i]: float(x) for i, x in enumerate(moves[:, k]) if x}
+        moved = {model.geometry[i]: float(x) for i, x in enumerate(varied.moves[:, k]) if x}
         parameters.append(Parameter(name, unit, _nominal(geometry, name), moved))
     pushes = _pushes(case, model) if case.forces else {}
     outputs: list[CodeOutput] = []
@@ -424,22 +418,9 @@ def _output(model: Model, quantity: Quantity, kept: int) -> CodeOutput:
 
 def _completion(quantity: Orientation) -> Program:
     """Return the program of an attitude: twelve numbers, Euler parameters and two rates, to the
-    three orders of the component. Those of a rotation vector are of half a turn at most.
+    three orders of the component.
     """
     tape = Tape()
-    e0, *along = (Jet(*(tape.input(4 * order + k) for order in range(3))) for k in range(4))
-    if quantity.unit == "1":
-        found = (e0, *along)[int(quantity.component[1])]
-    else:
-        square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
-        size = sqrt(square)
-        quotient = 2.0 * arctan2(size, e0) / size
-        series = 2.0 + square * (1.0 / 3.0 + square * (3.0 / 20.0 + square * (5.0 / 56.0)))
-        orders = zip(_orders(quotient), _orders(series), strict=True)
-        factor = Jet(*(where_larger(square.x, SMALL, far, near) for far, near in orders))
-        found = factor * along["xyz".index(quantity.component)]
+    e = [Jet(*(tape.input(4 * order + k) for order in range(3))) for k in range(4)]
+    found = quantity.component_of(e)
     return program("complete", tape, dict(enumerate((found.x, found.v, found.a))))
-
-
-def _orders(jet: Jet) -> tuple[Scalar, Scalar, Scalar]:
-    return jet.x, jet.v, jet.a

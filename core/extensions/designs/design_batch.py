@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...algebra import Vec3
+from ...case.quantity import point_jets, still_jets
 from ...dataset import Dataset, Variable
 from ...driving import Driving, in_words
 from ...errors import SolveError, number_of
 from ...input_checks import no_such, real
-from ...jet import Jet
 from ...kinematics.compiled.compiled_model import Executor, Model
 from ...kinematics.compiled.request import (
     LARGEST,
@@ -187,7 +186,7 @@ LANES = 512
 
 
 def slopes_of(route: Route, found: Variants, geometry: Array, towards: Array) -> dict[str, Array]:
-    """Return the slopes of outputs; see `PreparedDesigns.slopes`."""
+    """Return the slopes of vectors; see `PreparedDesigns.slopes`."""
     model, (n, count) = route.model, found.solved.shape
     outputs = [name for name in model.vectors if name.startswith(SLOPE_OF)]
     state = [*model.state]
@@ -255,14 +254,9 @@ def _outputs_of(
     """
     rows = dict[str, Array]()
     for each in (each for each in outputs if not each.alone):
-        at, design = dict[str, Vec3](), dict[str, Vec3]()
-        for name in each.equation.points:
-            orders = [getattr(found.points[name], label) for label in QUANTITIES]
-            unknown = np.full(orders[0].shape, np.nan)
-            known = (unknown if values is None else values for values in orders)
-            at[name] = Vec3(*(Jet(*jet) for jet in np.moveaxis(np.stack([*known]), 2, 0)))
-            place = mechanism.point(name).position
-            design[name] = Vec3(*(Jet(np.asarray(x), np.zeros(()), np.zeros(())) for x in place))
+        names = each.equation.points
+        at = {name: point_jets(found.points[name]) for name in names}
+        design = {name: still_jets(mechanism.point(name).position) for name in names}
         with np.errstate(all="ignore"):
             terms, speeds = each.equation.terms(at, design), each.equation.resting(at)
         for label, order in zip(QUANTITIES[: each.derivative + 1], "xva", strict=False):

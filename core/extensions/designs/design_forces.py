@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...forces import Forces
 from ...kinematics.compiled.compiled_model import Model, compile_model
-from ...kinematics.compiled.request import FORCE_SIGMA, SIGMA
+from ...kinematics.compiled.request import FORCE_SIGMA, REDUNDANT, SIGMA
 from ...kinematics.compiled.routes import Route
 from ...kinematics.followed import follower
 from ...kinematics.forces.reactions import forces_of
@@ -68,19 +68,44 @@ def forces_of_designs(
     """
     model, traced = route.model, route.model.forces
     # the program decides where all samples are far from singular poses
-    decided = np.full(found.solved.shape[1], fill_value=traced is not None, dtype=np.bool_)
-    together: Forces | None = None
-    if traced is not None:
-        for name in {SIGMA, FORCE_SIGMA} & model.rows.keys():
-            # NaN where a sample is missing
-            decided &= (found.kept[model.rows[name].start] > traced.least).all(axis=0)
-        if decided.any():
-            kept = found.kept if decided.all() else found.kept[:, :, decided]
-            together = traced.of(kept.reshape(len(kept), -1).T)
+    decided, together = np.asarray(_regular(model, found).all(axis=0)), None
+    if traced is not None and decided.any():
+        kept = found.kept if decided.all() else found.kept[:, :, decided]
+        together = traced.of(kept.reshape(len(kept), -1).T)
     others = np.flatnonzero(~decided & found.solved.any(axis=0))
     alone = _alone(route, wanted, geometry[:, others], tol) if len(others) else ()
     by_number = dict(zip(others.tolist(), alone, strict=True))
     return ForcesOfDesigns(found.solved, together, decided, by_number)
+
+
+def moved_forces(route: Route, found: Variants, moved: Mapping[str, Array]) -> ForcesOfDesigns:
+    """Return the derivatives of forces in the place of forces; none near singular poses, nor of
+    forces that cannot be traced.
+
+    Args:
+        moved: derivatives of the vectors of forces, shape (numbers, n, V).
+    """
+    model, traced = route.model, route.model.forces
+    every = np.ones(found.solved.shape[1], np.bool_)
+    if traced is None:
+        return ForcesOfDesigns(found.solved, None, every, {})
+    kept = found.kept.copy()
+    for name, values in moved.items():
+        first = model.rows[name].start
+        kept[first : first + len(values)] = values
+    if traced.redundant:  # what is determined has no part in what is not
+        kept[model.rows[REDUNDANT].start :][: traced.redundant] = 0.0
+    table = kept.reshape(len(kept), -1).T
+    return ForcesOfDesigns(_regular(model, found), traced.of(table), every, {})
+
+
+def _regular(model: Model, found: Variants) -> NDArray[np.bool_]:
+    """Return the samples at which the program decides on forces, shape (n, V)."""
+    if model.forces is None:
+        return np.zeros_like(found.solved)
+    # NaN where a sample is missing
+    sigmas = [found.kept[model.rows[x].start] for x in (SIGMA, FORCE_SIGMA) if x in model.rows]
+    return np.logical_and.reduce([each > model.forces.least for each in sigmas])
 
 
 def _alone(route: Route, wanted: WantedForces, geometry: Array, tol: float) -> Sequence[Forces]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,10 @@ from ...case.quantity import ORDERS
 from ...case.turns import Completion, over_sweep
 from ...jet import Jet
 from ...kinematics import NativeSolver, WantedOutput
+from ...kinematics.compiled.request import OUTPUT
 from ...mechanism.motions import Path
-from ...trajectory import Array
+from ...trajectory import QUANTITIES, Array
+from ..slopes.slopes import Slope, derivatives
 from .design_batch import Variants
 from .design_forces import ForcesOfDesigns
 from .prepared import PreparedDesigns, prepare_designs
@@ -39,11 +42,13 @@ class DesignOutputs:
     Attributes:
         outputs: of the case, by name.
         derivatives: highest kept time derivative of each output.
+        sloped: how many of value, rate and second rate have slopes, by output.
     """
 
     case: Case
     outputs: Mapping[str, Quantity]
     derivatives: Mapping[str, int]
+    sloped: Mapping[str, int]
     designs: PreparedDesigns
     path: Path
 
@@ -54,7 +59,7 @@ class DesignOutputs:
         varied: Collection[str],
         *,
         derivative: int = 0,
-        slopes: Collection[str] = (),
+        slopes: Mapping[str, int] = MappingProxyType({}),
         bodies: Sequence[str] = (),
     ) -> DesignOutputs:
         """Return a case with a compiled model.
@@ -62,7 +67,8 @@ class DesignOutputs:
         Args:
             varied: varied places, see `prepare_designs`.
             derivative: highest wanted time derivative; outputs have theirs as far as it is known.
-            slopes: names of outputs whose slopes by the varied places are wanted.
+            slopes: of how many of value, rate and second rate the slopes by the varied places are
+                wanted, by output.
             bodies: names of those whose poses are wanted.
 
         Raises:
@@ -79,7 +85,7 @@ class DesignOutputs:
         }
         wanted = [
             WantedOutput(
-                each, derivatives[name], tuple(each.facts.get(HELD_BUT, ())), name in slopes
+                each, derivatives[name], tuple(each.facts.get(HELD_BUT, ())), slopes.get(name, 0)
             )
             for name, each in outputs.items()
             if not each.forces
@@ -99,8 +105,9 @@ class DesignOutputs:
             forces=case.forces,
             bodies=bodies,
             outputs=wanted,
+            force_slopes=any(outputs[name].forces for name in slopes),
         )
-        return cls(case, outputs, derivatives, designs, case.sweep.path)
+        return cls(case, outputs, derivatives, slopes, designs, case.sweep.path)
 
     def on_path(self, path: Path) -> DesignOutputs:
         """Return the same program on another path of the same drivers."""
@@ -163,23 +170,44 @@ class SolvedDesigns:
         known = np.isfinite(values)
         return values if known.all() else np.where(known, values, np.nan)
 
-    def slopes(self, towards: Array) -> Iterator[tuple[str, Array]]:
-        """Yield the outputs whose slopes are wanted with their derivatives by motions of the
-        geometry, drivers held, shape (motions, n, V); NaN where an output has no value.
+    def slopes(self, towards: Array) -> Iterator[tuple[str, int, Array]]:
+        """Yield the outputs whose slopes are wanted, and their time derivatives by order, with
+        their derivatives by motions of the geometry, drivers held, shape (motions, n, V); NaN where
+        an output has no value.
 
         Args:
             towards: motions of the varied numbers, shape (numbers, motions).
         """
-        if not self.ready.designs.route.model.request.slopes:
+        sloped, designs, outputs = self.ready.sloped, self.ready.designs, self.ready.outputs
+        if not sloped:
             return
-        for name, moves in self.ready.designs.slopes(self.found, self.geometry, towards).items():
-            known, x = np.isfinite(self.values(name)), self.ready.designs.output(self.found, name)
-            slopes = np.empty((towards.shape[1], *known.shape))
-            for k, moved in enumerate(moves):
-                # by a motion in place of time
-                jets = [Jet(*each, np.nan) for each in zip(x, moved, strict=True)]
-                slopes[k] = np.where(known, self._completed(name)(jets).v, np.nan)
-            yield name, slopes
+        moved = designs.slopes(self.found, self.geometry, towards)
+        measures = {
+            name: each for name in sloped if isinstance(each := outputs[name], ForceMeasure)
+        }
+        carried = {name: np.empty((towards.shape[1], *self.solved.shape)) for name in measures}
+        for k in range(towards.shape[1]) if measures else ():
+            forces = designs.moved_forces(self.found, {name: x[k] for name, x in moved.items()})
+            for name, measure in measures.items():
+                carried[name][k] = forces.read(measure.values)
+        for name, count in sloped.items():
+            for order in range(count):
+                slopes = carried[name] if name in measures else self._moved(name, order, moved)
+                yield name, order, np.where(np.isfinite(self.values(name, order)), slopes, np.nan)
+
+    def _moved(self, name: str, order: int, moved: Mapping[str, Array]) -> Array:
+        vectors = [moved[f"{OUTPUT}{label} {name}"] for label in QUANTITIES[: order + 1]]
+        if not isinstance(self.ready.outputs[name], Orientation):
+            return vectors[order][:, 0]
+        e, terms = list[Jet](), self._terms(name)
+        for k, each in enumerate(terms):
+            known = [
+                Slope(x, by[:, k]) for x, by in zip((each.x, each.v, each.a), vectors, strict=False)
+            ]
+            e.append(Jet(*known, *[np.nan] * (ORDERS - len(known))))
+        with np.errstate(all="ignore"):
+            jet = self._completed(name)(e)
+        return np.asarray(derivatives((jet.x, jet.v, jet.a)[order]))
 
     def _terms(self, name: str) -> list[Jet]:
         designs, orders = self.ready.designs, range(self.ready.derivatives[name] + 1)

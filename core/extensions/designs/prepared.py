@@ -32,6 +32,8 @@ def prepare_designs(
     forces: Collection[str] = (),
     bodies: Sequence[str] = (),
     outputs: Sequence[WantedOutput] = (),
+    *,
+    force_slopes: bool = False,
 ) -> PreparedDesigns:
     """Return the mechanism made ready for many designs, as one program.
 
@@ -46,6 +48,7 @@ def prepare_designs(
             order 2.
         bodies: names of the bodies whose poses are wanted.
         outputs: wanted outputs, part of the programs.
+        force_slopes: whether the slopes of the forces by the varied places are wanted.
 
     Raises:
         SolveError: as `prepare`.
@@ -56,7 +59,7 @@ def prepare_designs(
     if wanted is not None:
         from ...kinematics.compiled.traced_forces import can_trace  # most studies are without
 
-        traced = wanted if can_trace(mechanism) else None
+        traced = replace(wanted, slopes=force_slopes) if can_trace(mechanism) else None
         request = replace(request, order=2, forces=traced)
     return PreparedDesigns(Route(compile_model(mechanism, request), path), wanted)
 
@@ -131,8 +134,9 @@ class PreparedDesigns:
         return None if rows is None else (found.kept[rows][0], found.kept[rows][1])
 
     def slopes(self, found: Variants, geometry: Array, towards: Array) -> Mapping[str, Array]:
-        """Return the derivatives of the terms of each output by motions of the geometry, drivers
-        held, shape (motions, terms, n, V); NaN at samples not reached.
+        """Return the derivatives of the vectors of outputs and forces whose slopes are wanted, by
+        motions of the geometry, drivers held, shape (motions, numbers, n, V); NaN at samples not
+        reached.
 
         Args:
             found: result of `solve` for the geometry.
@@ -151,6 +155,16 @@ class PreparedDesigns:
         from .design_forces import forces_of_designs  # most studies are without
 
         return forces_of_designs(self.route, self.wanted, found, geometry, tol)
+
+    def moved_forces(self, found: Variants, moved: Mapping[str, Array]) -> ForcesOfDesigns:
+        """Return the derivatives of forces in the place of forces; see `design_forces`.
+
+        Args:
+            moved: vectors of `slopes` by one of its motions.
+        """
+        from .design_forces import moved_forces
+
+        return moved_forces(self.route, found, moved)
 
     def iterations(self, found: Variants) -> Array:
         """Return Newton's iterations of each sample, shape (n, V)."""

@@ -21,36 +21,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import vec
+from ...algebra import Vec3
 from ...kinematics.compiled.compiled_model import compile_model
 from ...kinematics.compiled.request import Request
 from ...kinematics.continuation.segments import choose_rows
 from ...kinematics.continuation.sweep import sweep
-from ...kinematics.formulation.cartesian import COLUMNS, Cartesian
+from ...kinematics.formulation.cartesian import Cartesian
 from ...kinematics.formulation.constraints import Frames
-from ...kinematics.formulation.formulation import Configuration, position_of
+from ...kinematics.formulation.formulation import position_of
 from ...kinematics.formulation.parameters import placed, places
 from ...kinematics.formulation.state_vectors import displaced, jacobian, standing_drives, state_of
-from ...mechanism.mechanism import Mechanism, Point
+from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
-from ...primitives.base import GROUND_POSE, Drive, Twist
+from ...primitives.base import GROUND_POSE, Drive
 from ...trajectory import Array, Trajectory
 from ..slopes.slopes import Slope, derivatives
 from .rank import Screw, screws
-
-
-@dataclass(frozen=True, eq=False)
-class Gradient:
-    """Derivatives of a point's position [m] at a sample, by components x, y, z.
-
-    Attributes:
-        position: at the sample and at design, global [m], shape (3,).
-        by_residuals: by the residuals of the solved rows [m or rad], shape (3, rows).
-    """
-
-    position: Array
-    design: Array
-    by_residuals: Array
 
 
 class Geometry:
@@ -73,33 +59,6 @@ class Geometry:
         return np.broadcast_to(derivatives(x), (self.parameters,))
 
 
-def _gradient(
-    point: Point,
-    formulation: Cartesian,
-    at: Configuration,
-    frame: Frames,
-    shifts: Array,
-) -> Gradient:
-    """Return how the position of a point depends on residuals.
-
-    Args:
-        shifts: derivatives of the unknowns by the residuals of the solved rows [m or rad], shape
-            (unknowns, rows).
-    """
-    pose, arm = at.poses.get(point.body, GROUND_POSE), frame.arm(point.body, point.position)
-    turned, by_unknowns = pose.turn(arm), np.zeros((3, formulation.unknowns))
-    if point.body in formulation.columns:
-        first = formulation.columns[point.body]
-        for k, rates in enumerate(np.eye(COLUMNS).tolist(), first):
-            by_unknowns[:, k] = [*Twist(vec(rates[:3]), vec(rates[3:])).of(turned)]
-    by_unknowns *= frame.unit
-    return Gradient(
-        np.array([*position_of(point.position, arm, frame.unit, pose)]),
-        np.array(point.position),
-        by_unknowns @ shifts,
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class PoseConditioning:
     """Conditioning of the pose at a sample.
@@ -113,7 +72,8 @@ class PoseConditioning:
         orientation: sign of their determinant, against that at design; of all rows if there are
             more, followed from pose to pose.
         direction: the motion least determined by the rows.
-        points: gradients by point.
+        points: position of each point, global [m], whose slopes are by the residuals of the solved
+            rows [m or rad].
         contradicted: derivative of each redundant row's residual by the parameters of the geometry,
             shape (redundant rows, parameters).
     """
@@ -125,7 +85,7 @@ class PoseConditioning:
     largest: float
     orientation: float
     direction: list[Screw]
-    points: Mapping[str, Gradient]
+    points: Mapping[str, Vec3]
     contradicted: Array
 
     @property
@@ -211,7 +171,8 @@ def conditioning(
         )
         by_geometry = np.array([geometry.derivatives_of(x) for x in phi])
         shift = -inverse @ by_geometry[kept]
-        pose_of = formulation, configuration, frame
+        steps = [Slope(0.0, row) for row in metres]
+        poses = formulation.configuration(formulation.retract(configuration, steps)).poses
         looked.append(
             PoseConditioning(
                 k,
@@ -221,7 +182,15 @@ def conditioning(
                 float(sizes[0]),
                 1.0,
                 screws(formulation, configuration, frame, V[-1]),
-                {name: _gradient(mechanism.point(name), *pose_of, metres) for name in points},
+                {
+                    each.name: position_of(
+                        each.position,
+                        frame.arm(each.body, each.position),
+                        frame.unit,
+                        poses.get(each.body, GROUND_POSE),
+                    )
+                    for each in map(mechanism.point, points)
+                },
                 by_geometry[dropped] + rest @ shift,
             )
         )

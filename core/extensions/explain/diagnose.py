@@ -17,7 +17,7 @@ from ...harness.native_engine import explain
 from ...kinematics import forces_of
 from ...trajectory import Array, Trajectory
 from ..sweep.varied_places import Geometry
-from .bump_steer import bump_steer, left_by_moves
+from .bump_steer import bump_steer
 from .conditioning import Conditioning, conditioning
 from .outputs import Budget, Sensitivity, binding_numbers, budgets, read_points, sensitivities
 from .rank import (
@@ -264,6 +264,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
     forces = (
         determinacy(case, swept.trajectory) if swept and swept.trajectory.solved.any() else None
     )
+    steer, left = bump_steer(case) if derived else (None, {})
     return Diagnosis(
         schema=SCHEMA,
         case=case.name,
@@ -286,13 +287,13 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         sensitivities=sensitivities(case, swept, geometry) if swept and derived else [],
         binding=binding_numbers(swept, variables) if swept and derived else [],
         shims={each.name: each.shim.tolist() for each in case.hardpoints if each.shim is not None},
-        bump_steer=bump_steer(case) if derived else None,
+        bump_steer=steer,
         no_bump_steer={
             each.name: [float(x) if np.isfinite(x) else None for x in each.no_bump_steer]
             for each in case.hardpoints
             if each.no_bump_steer is not None
         },
-        bump_steer_left=left_by_moves(case) if derived else {},
+        bump_steer_left=left,
         moves={each.name: each.places for each in variables},
         signs=case.signs,
         not_derived=[output.name for output in case.outputs if output.orders != ORDERS],

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import msgspec
 import numpy as np
 
-from ...algebra import Vec3, vec
+from ...algebra import Vec3
 from ...case.case import ORDERS, Case, Quantity, without_forces
 from ...case.quantity import still_jets
 from ...harness.compare import numbers as as_numbers
@@ -17,7 +18,8 @@ from ...joints import Kind
 from ...mechanism.motions import PointCoordinate
 from ...trajectory import Array
 from ..designs.outputs import DesignOutputs
-from ..sweep.varied_places import Geometry, Variable
+from ..slopes.slopes import derivatives, value
+from ..sweep.varied_places import Geometry, Moves, Variable
 from .conditioning import Conditioning, PoseConditioning
 
 # The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for
@@ -75,15 +77,15 @@ class Sensitivity(msgspec.Struct, frozen=True):
 
 def budgets(case: Case, found: Conditioning, tol: float) -> list[Budget]:
     """Return the budget of every output of the pose alone."""
-    return [_budget(output, found, tol) for output in case.outputs if output.orders == ORDERS]
+    return [_budget(case, output, found, tol) for output in case.outputs if output.orders == ORDERS]
 
 
-def _budget(output: Quantity, found: Conditioning, tol: float) -> Budget:
-    by_rows = [np.abs(_derivative(output, pose)[1]) for pose in found.poses]
+def _budget(case: Case, output: Quantity, found: Conditioning, tol: float) -> Budget:
+    by_rows = [np.abs(_derivative(case, output, pose)[1]) for pose in found.poses]
     shifts = [float(rows.sum()) for rows in by_rows]
     k = int(np.argmax(shifts))
     row = int(by_rows[k].argmax())
-    size = max(float(np.abs(_derivative(output, pose)[0]).max()) for pose in found.poses)
+    size = max(float(np.abs(_derivative(case, output, pose)[0]).max()) for pose in found.poses)
     shift = tol * shifts[k]
     suggested = _two_digits(MARGIN * shift)
     why = (
@@ -114,18 +116,17 @@ def sensitivities(case: Case, found: Conditioning, geometry: Geometry) -> list[S
         for each in geometry.variables
         for name in each.numbers
     ]
-    moves = geometry.moves(geometry.variables)
-    moved = [name for name in moves if np.abs(moves[name]).any()]
-    names = [each.name for each in case.outputs if not each.forces]
-    if not moved or not names:
+    every = geometry.moves(geometry.variables)
+    moved = {place: each for place, each in every.items() if each.any()}
+    wanted = {each.name: 1 for each in case.outputs if not each.forces}
+    if not moved or not wanted:
         return []
-    held = _shifted_drivers(case, moves)
-    ready = DesignOutputs.of(without_forces(case), moved, slopes=names, derivative=int(bool(held)))
-    nominal = np.concatenate([geometry.values[name] for name in moved])[:, None]
+    held, moves = _shifted_drivers(case, moved), Moves.of(geometry.values, moved)
+    ready = DesignOutputs.of(without_forces(case), moved, slopes=wanted, derivative=int(bool(held)))
     samples = [pose.sample for pose in found.poses]
     result: list[Sensitivity] = []
-    solved = ready.solve(nominal)
-    for name, slopes in solved.slopes(np.concatenate([moves[each] for each in moved])):
+    solved = ready.solve(moves.nominal[:, None])
+    for name, _, slopes in solved.slopes(moves.moves):
         own: list[Sensitivity] = []
         slopes = slopes[:, samples, 0]
         for driver, shift in held.items():
@@ -167,24 +168,20 @@ def binding_numbers(found: Conditioning, variables: Sequence[Variable]) -> list[
     return [name for name, rate in zip(names, contradicted, strict=True) if rate > NOTHING]
 
 
-def _derivative(output: Quantity, pose: PoseConditioning) -> tuple[Array, Array]:
+def _derivative(case: Case, output: Quantity, pose: PoseConditioning) -> tuple[Array, Array]:
     """Return value and derivatives of an output by residuals, from those of its points; residuals
     do not shift its points at design.
     """
-    at = {name: _jets(each.position, each.by_residuals) for name, each in pose.points.items()}
-    still = {name: still_jets(each.design) for name, each in pose.points.items()}
-    jet = output.of(at, still)
-    return jet.x, np.broadcast_to(jet.v, next(iter(at.values())).x.v.shape)
+    rows = np.zeros(len(pose.owners))
 
+    def jet(x: Any) -> Jet:
+        """Return a number as a jet, with derivatives in place of time derivatives."""
+        return Jet(rows + value(x), rows + derivatives(x), rows)
 
-def _jets(position: Array, derivatives: Array) -> Vec3:
-    """Return a position as jets, with derivatives in place of time derivatives."""
-    return vec(
-        [
-            Jet(np.full_like(d, x), d, np.zeros_like(d))
-            for x, d in zip(position, derivatives, strict=True)
-        ]
-    )
+    at = {name: Vec3(*map(jet, pose.points[name])) for name in output.points}
+    still = {name: still_jets(case.mechanism.point(name).position) for name in output.points}
+    found = output.of(at, still)
+    return found.x, np.broadcast_to(found.v, rows.shape)
 
 
 def _two_digits(x: float) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -31,11 +31,14 @@ _MEASURE = re.compile(r"([-+−]?(?:\d+[.,]?\d*|[.,]\d+))[\s,;]*[\[(]?([^\d\s,;\
 _SLIP = 0.75
 # Shorter words stand by themselves, unless they are Chinese.
 SHORT = 3
+# Texts whose meanings are kept: those of a table that is read at each edit.
+TEXTS = 4096
 _PARTS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[^\W_]+")
 _AXIS = re.compile(r"(?<![^\W_])([xyz])(?![^\W_])")
 
 
-def said(text: str, kind: str) -> list[str]:
+@lru_cache(TEXTS)
+def said(text: str, kind: str) -> Sequence[str]:
     """Return the meanings in a text, in the order of its words.
 
     Args:
@@ -50,7 +53,7 @@ def said(text: str, kind: str) -> list[str]:
         if match := re.search(form, rest):
             found += [(match.start(), each) for each in meanings]
             rest = re.sub(form, lambda each: "*" * len(each[0]), rest)
-    return [meaning for _, meaning in sorted(found)]
+    return tuple(meaning for _, meaning in sorted(found))
 
 
 @cache

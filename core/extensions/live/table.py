@@ -231,7 +231,7 @@ class LiveTable(LiveFile):
         )
         ready = self._ready_for(case, asked.output)
         found = ready.solve(geometry_of(case), alone=False)
-        ((_, by_number),) = found.slopes(towards)
+        ((*_, by_number),) = found.slopes(towards)
         samples = key_samples(self.case, found.solved)
         slopes = by_number[:, samples, 0].T
         order: list[int] = np.argsort(
@@ -324,7 +324,7 @@ class LiveTable(LiveFile):
         if name not in self._differentiated:
             alone = replace(case, outputs=(output,))
             self._differentiated[name] = DesignOutputs.of(
-                alone, places(case.mechanism), slopes=(name,)
+                alone, places(case.mechanism), slopes={name: 1}
             )
         return self._differentiated[name]
 

@@ -7,15 +7,17 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...program.plan import Parts, Side
 from ...trajectory import Array
 from .jit import LlvmCode
-from .loops import MOTION, SIDE
+from .loops import MOTION, PART, SIDE, WALK
 from .plan import BYTES, LINE, address, aligned
 
 OUT, FORGET = (MOTION.index(each) for each in ("ptr out", "i64 forget"))
 REACHED = SIDE.index("i64 reached")
+SAMPLES, OUT_OF_WALK = PART.index("ptr samples"), WALK.index("ptr out")
 
 
 class LlvmExecutor:
@@ -105,23 +107,99 @@ class LlvmExecutor:
         """See `NumpyExecutor`."""
         return -(-lanes // self._code.width)
 
-    def parts(self, parts: Parts) -> Callable[[int], object]:
+    def parts(self, parts: Parts) -> LlvmParts:
         """See `NumpyExecutor`."""
-        samples, addresses = (
-            parts.samples,
-            [each.ctypes.data for each in (parts.taken, parts.world)],
-        )
-        own = [each.ctypes.data for each in (parts.members, parts.fixed, parts.ahead, samples)]
-        tables = *own, samples.shape[1], *addresses, parts.base, parts.worst.ctypes.data
-        call = partial(
-            self._code.call("parts", "parts"), self._address, len(parts.members), *tables
-        )
+        return LlvmParts(self._code, self._address, parts)
 
-        def count(groups: int) -> None:
-            call(groups)
-            self._code.count(groups * len(parts.members))
 
-        return count
+class LlvmParts:
+    """See `NumpyExecutor.parts`.
+
+    Attributes:
+        fields: in the order of `PART`.
+    """
+
+    def __init__(self, code: LlvmCode, memory: int, parts: Parts) -> None:
+        own, samples = [parts.members, parts.fixed, parts.samples], parts.samples.shape[1]
+        own_at = [each.ctypes.data for each in own]
+        world = parts.taken.ctypes.data, parts.world.ctypes.data, parts.world.shape[1], parts.base
+        fields = code.memory.address, memory, len(parts.members), *own_at, samples, *world
+        self.fields = np.array([*fields, parts.worst.ctypes.data], np.int64)
+        self.parts, self._code = parts, code
+        self._call = partial(code.call("parts", "parts"), address(self.fields))
+
+    @property
+    def width(self) -> int:
+        """The lanes of a group."""
+        return self._code.width
+
+    def walk(self, fields: int) -> Callable[[int], int]:
+        """Return the function of a walk with these fields."""
+        return partial(self._code.call("parts", "walk"), fields)
+
+    def __call__(self, lane: int, groups: int) -> None:
+        """Attempt the parts; see `NumpyExecutor.parts`."""
+        # the sample of the lane is the one before
+        self._call(lane + 1 if lane >= 0 else 0, lane, groups)
+        self.count(groups)
+
+    def count(self, groups: int) -> None:
+        """Count groups of lanes run so far; see `LlvmCode`."""
+        self._code.count(groups * len(self.parts.members))
+
+
+class LlvmWalk:
+    """A walk over samples through parts of a mechanism; see `loops.parts`.
+
+    Args:
+        calls: of the parts, in order; they share world and tests.
+        many: samples at once.
+        wanted: rows of the world to store at each sample.
+        best: start values of the tests.
+        deciding: rows of the residual, of sigma and of the margin among the tests.
+    """
+
+    def __init__(
+        self,
+        calls: Sequence[LlvmParts],
+        many: int,
+        wanted: NDArray[np.int64],
+        best: Array,
+        deciding: Sequence[int],
+    ) -> None:
+        self._calls, self._many = calls, many
+        parts, tests = calls[0].parts, np.arange(len(best))
+        self._parts = np.stack([each.fields for each in calls])
+        self._alive = wanted, tests, best, parts
+        room, at = parts.worst.shape[1], [each.ctypes.data for each in (wanted, tests)]
+        given = self._parts.ctypes.data, len(calls), many, parts.world.ctypes.data
+        worst = parts.worst.ctypes.data
+        closures, sigmas, margins = (worst + BYTES * room * row for row in deciding)
+        fields = *given, worst, room, best.ctypes.data, at[0], len(wanted), at[1], len(tests)
+        self._rows, self._wanted = len(wanted) + len(tests), len(wanted)
+        self._fields = np.array([*fields, 0, 0, closures, sigmas, margins, 0, 0], np.int64)
+        self._limits = self._fields.view(np.float64)[-2:]
+        self._run = calls[0].walk(address(self._fields))
+
+    def __call__(
+        self, samples: Sequence[Array], count: int, limits: tuple[float, float]
+    ) -> tuple[Array, Array]:
+        """Follow samples; return the wanted values and the tests of those followed.
+
+        Args:
+            samples: see `Parts`, for each of the calls; `many` more columns than samples.
+            limits: the least residual that counts, and its bound by the square of sigma.
+        """
+        columns = count + self._many
+        out, wanted = np.empty((self._rows, columns)), self._wanted
+        at = {id(each): (each.ctypes.data, each.strides[0] // BYTES) for each in samples}
+        self._parts[:, SAMPLES : SAMPLES + 2] = [at[id(each)] for each in samples]
+        self._fields[OUT_OF_WALK : OUT_OF_WALK + 2] = address(out), columns
+        self._limits[:] = limits
+        followed = self._run(count)
+        for each in self._calls:
+            each.count(-(-count // self._calls[0].width))
+        return out[:wanted, :followed], out[wanted:, :followed]
 
 
 class LlvmTrack:

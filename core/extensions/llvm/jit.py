@@ -92,7 +92,7 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
         {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3},
     ),
     "fan": ([*_NEEDED, run_motions], {"fan": 12}),
-    "parts": ([*_NEEDED, parts], {"parts": 13}),
+    "parts": ([*_NEEDED, parts], {"parts": 5, "walk": 3}),
 }
 """Modules of loops: their writers, and their functions with the number of arguments."""
 OFTEN, AGAIN, OPERATIONS = 150, 20, 3000

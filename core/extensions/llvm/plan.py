@@ -32,6 +32,7 @@ TABLES: Mapping[str, int] = {
     **dict.fromkeys(PAIRS, 2),
     **dict.fromkeys(("targets", "sampled", "kept", "fixed", "taken"), 1),
     "left": 2,
+    "given": 2,
     "worst": 3,  # slot; 1, or -1 for the smallest; start value
 }
 """Columns of each table. A table takes two numbers of the plan: its address and its number of rows.
@@ -83,7 +84,7 @@ def over(name: str, table: str, *arguments: str) -> str:
     return f"call void @{name}({', '.join((rows, *arguments))})"
 
 
-def _each_row(name: str, arguments: str, body: str, step: int = 1) -> str:
+def each_row(name: str, arguments: str, body: str, step: int = 1) -> str:
     """Return a loop over the rows of a table, one or several at a time, as a function."""
     return f"""define internal void @{name}(ptr %lane, ptr %table, i64 %count{arguments}) {{
 entry:
@@ -107,7 +108,7 @@ def each_slot(name: str, arguments: str, body: str, columns: int = 1) -> str:
   %place = getelementptr i64, ptr %table, i64 %place_at
   %bytes = load i64, ptr %place, align 8
   %slot = getelementptr i8, ptr %lane, i64 %bytes"""
-    return _each_row(name, arguments, f"{place}\n  {body}")
+    return each_row(name, arguments, f"{place}\n  {body}")
 
 
 def each_number(name: str, body: str, columns: int = 1, arguments: str = "") -> str:
@@ -132,7 +133,7 @@ def each_pair(name: str, arguments: str, body: str) -> str:
   """
     pairs = "%pairs = getelementptr [2 x i64], ptr %table, i64 %row"
     unrolled = [(lines + body).replace("#", str(k)) for k in range(TOGETHER)]
-    return _each_row(name, arguments, "\n  ".join([pairs, *unrolled]), TOGETHER)
+    return each_row(name, arguments, "\n  ".join([pairs, *unrolled]), TOGETHER)
 
 
 def all_lanes(width: int, name: str) -> str:
@@ -181,7 +182,7 @@ def rows(width: int) -> str:
   {store} %worst, ptr %number, align 8"""
     return "".join(
         [
-            _each_row("calls", "", calls),
+            each_row("calls", "", calls),
             each_pair("copy", "", copy),
             each_pair("spread", ", i64 %k", spread),
             each_number("give", give),
@@ -232,7 +233,8 @@ class PlanInMemory:
                 name: vector * _table(getattr(plan, name), 1)
                 for name in ("sampled", "kept", "fixed", "taken")
             },
-            "left": _table([(vector * slot, k) for slot, k in plan.fixed_targets], 2),
+            "left": _table(plan.fixed_from(plan.kept), 2),
+            "given": _table(plan.fixed_from(plan.sampled), 2),
             "worst": _table(
                 [
                     (vector * x, _bits(sign), _bits(start))

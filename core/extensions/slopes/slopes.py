@@ -7,20 +7,19 @@ between neighbouring designs would jump with the choice.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ...algebra import Scalar, Vec3, power
+from ...algebra import Scalar, Vec3, arc_tangent, power, root, where_larger
 from ...trajectory import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slope:
-    """x: the value; d: its derivatives, shape (parameters,)."""
+    """x: the value, or lanes; d: its derivatives, shape (parameters, *lanes)."""
 
     __array_ufunc__: ClassVar[None] = None
-    x: float
+    x: Any
     d: Array
 
     def __add__(self, b: Any) -> Slope:
@@ -72,16 +71,24 @@ class Slope:
 
     def sqrt(self) -> Slope:
         """The square root."""
-        x = math.sqrt(self.x)
+        x = root(self.x)
         return Slope(x, self.d / (2.0 * x))
 
     @staticmethod
-    def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
+    def arc_tangent(y: Scalar, x: Scalar) -> Slope:
+        """Return the angle of the direction (x, y) [rad]."""
+        b, a = value(y), value(x)
+        turned = (a * derivatives(y) - b * derivatives(x)) / (a * a + b * b)
+        return Slope(arc_tangent(b, a), turned)
+
+    @staticmethod
+    def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Slope:
         """Return p if |a| > |b|, else q; the values decide."""
-        return p if abs(value(a)) > abs(value(b)) else q
+        a, b = value(a), value(b)
+        return Slope(*(where_larger(a, b, of(p), of(q)) for of in (value, derivatives)))
 
 
-def value(a: Any) -> float:
+def value(a: Any) -> Any:
     """The number without its derivatives."""
     return a.x if isinstance(a, Slope) else a
 

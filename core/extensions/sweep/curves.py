@@ -22,7 +22,7 @@ from ...mechanism.motions import PointCoordinate
 from ...tabular import Tabular
 from ...trajectory import Array
 from ..designs.outputs import DesignOutputs
-from .varied_places import Geometry, PlaceError
+from .varied_places import Geometry, Moves, PlaceError, by_place
 
 # Cases kept ready: for an optimisation that asks again and again, with and without slopes.
 READY = 8
@@ -83,14 +83,12 @@ class ReadyCurves:
     """A case made ready for designs with offsets of its places.
 
     Attributes:
-        nominal: numbers of the places that follow, shape (numbers,).
-        moves: their derivatives by the named places, shape (numbers, places).
+        varied: moves of the geometry by the named places.
         units: of the named places.
     """
 
     outputs: DesignOutputs
-    nominal: Array
-    moves: Array
+    varied: Moves
     units: Mapping[str, str]
     with_slopes: tuple[str, ...] = ()
 
@@ -103,17 +101,6 @@ class ReadyCurves:
         units = {name: unit[turning.get(name)] for name in moved}
         return Driving(case.sweep.path.times, moved, units)
 
-    def geometry(self, offsets: Array) -> Array:
-        """Return the numbers of designs, shape (numbers, V), from offsets of shape (V, places).
-
-        The sum is computed term by term: the rounding of a matrix product may depend on the number
-        of designs.
-        """
-        found = np.repeat(self.nominal[:, None], len(offsets), axis=1)
-        for number, place in np.argwhere(self.moves).tolist():
-            found[number] += self.moves[number, place] * offsets[:, place]
-        return found
-
     def solve(self, offsets: Array, tol: float) -> DesignCurves:
         """Return the curves of designs; see `curves`."""
         (count, places), n = offsets.shape, len(self.outputs.path.times)
@@ -123,13 +110,13 @@ class ReadyCurves:
         solved, messages = np.empty((n, count), dtype=np.bool_).T, dict[int, str]()
         for first in range(0, count, at_once := self.outputs.at_once):
             here = slice(first, min(first + at_once, count))
-            part = self.outputs.solve(self.geometry(offsets[here]), tol)
+            part = self.outputs.solve(self.varied.geometry(offsets[here].T), tol)
             solved[here] = part.solved.T
             messages |= {first + k: why for k, why in part.found.messages.items()}
             for name, each in values.items():
                 each[here] = part.values(name).T
-            for name, by_place in part.slopes(self.moves):
-                slopes[name][here] = by_place.T
+            for name, _, by in part.slopes(self.varied.moves):
+                slopes[name][here] = by.T
         outputs = self.outputs.outputs
         return DesignCurves(
             values,
@@ -230,21 +217,15 @@ def _ready(
     for name in (*wanted, *slopes):
         if name not in known:
             raise CaseError(f"curves: {unknown('output', name, known)}")
-    for name in slopes:
-        if known[name].forces:
-            raise CaseError(f"curves: {name!r} is a force, which has no slopes; leave it out there")
     chosen = [known[name] for name in dict.fromkeys((*wanted, *slopes))]
     case = replace(case, outputs=tuple(chosen))
-    varied, nominal, moves, units = moved_by(case, names)
-    designs = DesignOutputs.of(case, varied, slopes=slopes)
-    return ReadyCurves(designs, nominal, moves, units, slopes)
+    varied, units = moved_by(case, names)
+    designs = DesignOutputs.of(case, varied.places, slopes=dict.fromkeys(slopes, 1))
+    return ReadyCurves(designs, varied, units, slopes)
 
 
-def moved_by(
-    case: Case, names: Sequence[str]
-) -> tuple[Sequence[str], Array, Array, Mapping[str, str]]:
-    """Return the places that follow numbers of the geometry, their own numbers at design, shape
-    (numbers,), the derivatives of these, shape (numbers, names), and the units of the named ones.
+def moved_by(case: Case, names: Sequence[str]) -> tuple[Moves, Mapping[str, str]]:
+    """Return the moves of the geometry by named numbers, and the units of these.
 
     Raises:
         CaseError: there is no such place, or the case drives the absolute position of a point that
@@ -254,22 +235,16 @@ def moved_by(
         raise CaseError("curves: places names nothing to vary, expected 'lca_front z' or the like")
     geometry = Geometry(case)
     found = [_number(geometry, name) for name in names]
-    moves = [moved for moved, _ in found]
-    varied = dict.fromkeys(place for moved in moves for place in moved)
+    varied = Moves.of(geometry.values, by_place([moved for moved, _ in found]))
     for driver in case.mechanism.drivers:
         if not isinstance(driver, PointCoordinate) or driver.relative:
             continue
-        if (point := f"points.{driver.point}.position") in varied:
+        if (point := f"points.{driver.point}.position") in varied.places:
             raise CaseError(
                 f"curves: driver {driver.name!r} gives the absolute position of a point that"
                 f" varies, {point}; drive it with relative = true, or leave the point"
             )
-    still = {place: np.zeros(len(geometry.values[place])) for place in varied}
-    matrix = [np.concatenate([*(still | moved).values()]) for moved in moves]
-    nominal = [x for place in varied for x in geometry.values[place]]
-    units = {name: unit for name, (_, unit) in zip(names, found, strict=True)}
-    numbers = np.array(matrix).reshape(len(names), len(nominal)).T
-    return [*varied], np.array(nominal, dtype=float), numbers, units
+    return varied, {name: unit for name, (_, unit) in zip(names, found, strict=True)}
 
 
 def _number(geometry: Geometry, name: str) -> tuple[dict[str, Array], str]:
@@ -293,13 +268,12 @@ def _number(geometry: Geometry, name: str) -> tuple[dict[str, Array], str]:
     column = 0 if alone else "xyz".index(axis)
     number = variable.kind is Kind.NUMBER
     unit = geometry.dimensions[variable.name].of("m", "rad") if number else "m"
-    moved = {place: slopes[:, column] for place, slopes in variable.moves.items()}
-    return moved, "rad" if variable.kind is Kind.DIRECTION else unit
+    return variable.columns[column], "rad" if variable.kind is Kind.DIRECTION else unit
 
 
 def _offsets(ready: ReadyCurves, given: ArrayLike) -> Array:
     found = real("curves", "offsets", given, "a row for each design, a column for each place")
-    expected = ready.moves.shape[1]
+    expected = ready.varied.moves.shape[1]
     if found.ndim != 2 or found.shape[1] != expected:
         raise CaseError(
             f"curves: offsets have shape {found.shape}, expected (designs, {expected}): a column"

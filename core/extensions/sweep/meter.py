@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from ...case.io.escape import visible
-from ...report.terminal import _time
 
 
 class Meter:
@@ -69,3 +68,13 @@ class Meter:
         print(
             f"{self.name}: {visible(what)} ({100 * done:.0f} %{left})", file=sys.stderr, flush=True
         )
+
+
+def _time(seconds: float) -> str:
+    """Return a time as text with at most two units."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -16,7 +16,16 @@ from ...report.sections import environment, figure_parts
 from ...unit_text import with_unit
 from .conformance import Capability, Histogram
 from .results import Envelope, Gradient, Numbers, SweepResults
-from .tables import effect, headline, interval, limit_notes, other_yield, percent, scaled_number
+from .tables import (
+    effect,
+    headline,
+    interval,
+    limit_notes,
+    other_yield,
+    percent,
+    scaled_number,
+    without_gradients,
+)
 
 DIGITS = 7
 """Digits of a drawn number: one more than the page shows when the reader points at a curve."""
@@ -93,6 +102,7 @@ def page(results: SweepResults) -> str:
             shown=shown,
             shown_unit=results.shown_unit,
             limit_notes=limit_notes(results),
+            without_gradients=without_gradients(results),
             other_yield=other_yield(results),
             percent=percent,
             interval=interval,
@@ -104,7 +114,7 @@ def page(results: SweepResults) -> str:
 def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str, str]:
     """Return the numbers of a gradient, and their unit, in units of the file."""
     its, factor = results.shown_unit(results.unit_of(each.coordinate))
-    names = ("at_design", "largest", "error")
+    names = ("at_design", "largest")
     found = {name: scaled_number(view.scale / factor, getattr(each, name)) for name in names}
     return {**found, "unit": f"({view.unit})/({its})"}
 

@@ -96,10 +96,6 @@ class Gradient(msgspec.Struct, frozen=True, kw_only=True):
         along: values at the samples.
         largest: the value of largest size over the samples, with its sign.
         sample: the sample of `largest`.
-        error: bound of the error: zero of an exact slope; of the difference of a rate or a force,
-            from two step sizes.
-        accurate: whether `error` is at most 1e-6 of the output's largest gradient by any coordinate
-            of the same unit.
         scale: scale of the coordinate.
         deviation: standard deviation of the coordinate's offsets, or the largest offset if one
             coordinate at a time varies [unit]; times `largest` it is the effect.
@@ -112,8 +108,6 @@ class Gradient(msgspec.Struct, frozen=True, kw_only=True):
     along: Numbers
     largest: float | None
     sample: int | None
-    error: float | None
-    accurate: bool
     scale: float
     deviation: float
 
@@ -160,7 +154,6 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
     outputs: dict[str, Envelope]
     quantiles_of: int
     gradients: list[Gradient]
-    gradient_messages: dict[str, str] = {}
     effects: list[Effect] = []
     unsolved: int
     failed: list[Unsolved]
@@ -298,8 +291,6 @@ def gradient_table(study: Study, found: Gradients) -> list[Gradient]:
                     along=numbers(along),
                     largest=None if sample is None else float(along[sample]),
                     sample=sample,
-                    error=numbers(found.error[c, r : r + 1])[0],
-                    accurate=bool(found.accurate[c, r]),
                     scale=coordinate.scale,
                     deviation=coordinate.scale if alone else coordinate.standard_deviation,
                 )

@@ -1,7 +1,7 @@
 """A study of design variants: a case, its variants, and the values to reduce or keep.
 
 A `Study` is plain data, picklable. A `Ready` study has a compiled model: it solves chunks of
-variants, and finds the gradients at the nominal design.
+variants.
 """
 
 from __future__ import annotations
@@ -10,12 +10,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...case.case import Case, Quantity, size
+from ...case.case import Case, Quantity
 from ...errors import KincheckError
 from ...kinematics import placed
 from ...mechanism.motions import Path
@@ -254,10 +253,6 @@ class Ready:
         places = study.variation.places
         return Ready(study, DesignOutputs.of(study.case, places, derivative=study.order))
 
-    def on_path(self, path: Path) -> Ready:
-        """Return the same model on another path of the same drivers."""
-        return Ready(self.study, self.outputs.on_path(path))
-
     @property
     def lanes(self) -> int:
         """The number of variants solved at once."""
@@ -306,7 +301,7 @@ class Ready:
             index,
             count,
             summary_of(values, first),
-            (values[:, :, chosen],) if chosen.any() else (),
+            (values if chosen.all() else values[:, :, chosen],) if chosen.any() else (),
             {
                 k: values[:, :, k - first].copy()
                 for k in study.picked.intersection(range(first, first + count))
@@ -333,105 +328,31 @@ def largest(changes: Array) -> Array:
     return np.take_along_axis(changes, sizes.argmax(axis=1)[:, None, :], axis=1)[:, 0]
 
 
-# Gradients of the rows by the coordinates of a variation at the nominal design. Outputs of the
-# motion have exact slopes. Rates and forces have central differences D of solved variants, with
-# steps h and h/2: Richardson's (4 D(h/2) - D(h)) / 3, whose error is below |D(h/2) - D(h)| / 3 if
-# the series converges. With h/size = 2e-4 round-off of 1e-15 is 5e-12 of a gradient of one.
-
-STEP = 2e-4
-# Required accuracy: error relative to the row's largest gradient by a coordinate of the same unit.
-ACCURATE = 1e-6
-# Round-off of the gradient of a row without first-order change: this share of the row's size, or of
-# the mechanism's, divided by the step. It is a thousand times a number's round-off.
-ROUND_OFF = 1e-13
-MOVES = np.array([1.0, -1.0, 0.5, -0.5])
-
-
 @dataclass(frozen=True, eq=False)
 class Gradients:
-    """Derivatives of the rows of a study by its coordinates, at the nominal design.
+    """Derivatives of the rows of a study by its coordinates, at the nominal design: exact slopes.
 
     Attributes:
         along: over the samples [unit of row / unit of coordinate], shape (coordinates, rows, n);
-            NaN if the nominal design, or of a difference a neighbour, has no value.
+            NaN if the nominal design has no value, or a force no slope there.
         design: at the design position, shape (coordinates, rows); None if the case does not
             pass through it.
-        error: bound of the error of differences over the samples and at design, zero of slopes,
-            shape (coordinates, rows).
-        accurate: whether the error is at most `ACCURATE` of the row's largest gradient, or
-            round-off, shape (coordinates, rows).
-        messages: by coordinate, the reason why a neighbour has no solution.
     """
 
     along: Array
     design: Array | None
-    error: Array
-    accurate: Any
-    messages: dict[int, str]
 
 
-def gradients(ready: Ready) -> Gradients:
+def gradients(study: Study) -> Gradients:
     """Return the gradients of a study."""
-    study, case, path = ready.study, ready.study.case, ready.study.case.sweep.path
-    n, count = len(path.times), len(study.variation.coordinates)
-    start = ready.outputs.designs.start
-    from_design = start.starts_at_design
-    if from_design:  # one sample more, at the design position
+    case, variation, path = study.case, study.variation, study.case.sweep.path
+    orders = {each.output.name: each.derivative + 1 for each in study.rows}
+    made = DesignOutputs.of(case, variation.places, derivative=study.order, slopes=orders)
+    n, start = len(path.times), made.designs.start
+    if start.starts_at_design:  # one sample more, at the design position
         path = Path(path.motions, np.append(path.times, start.time), path.design)
-    found = np.empty((count, len(study.rows), n + from_design))
-    exact = np.array([not (each.derivative or each.output.forces) for each in study.rows])
-    if exact.any():
-        motion = tuple(each for each in case.outputs if not each.forces)
-        places, names = study.variation.places, [each.name for each in motion]
-        made = DesignOutputs.of(replace(case, outputs=motion), places, slopes=names)
-        solved = made.on_path(path).solve(study.variation.nominal[:, None], study.tol)
-        slopes = dict(solved.slopes(study.variation.moves))
-        found[:, exact] = np.stack([slopes[name][:, :, 0] for name in names], axis=1)
-    error, messages = np.zeros(found.shape[:2]), dict[int, str]()
-    steps = np.array([STEP * _size(study, k) for k in range(count)])
-    if not exact.all():
-        ready = ready.on_path(path)
-        for k, h in enumerate(steps.tolist()):
-            offsets = np.zeros((count, len(MOVES)))
-            offsets[k] = h * MOVES
-            values, _, _, why = ready.values(offsets)
-            plus, minus, half_plus, half_minus = np.moveaxis(values[~exact], -1, 0)
-            whole, half = (plus - minus) / (2.0 * h), (half_plus - half_minus) / h
-            found[k, ~exact] = (4.0 * half - whole) / 3.0
-            error[k, ~exact] = np.fmax.reduce(np.abs(half - whole), axis=1) / 3.0
-            if why:
-                messages[k] = next(iter(why.values()))
-    accurate = error <= np.maximum(ACCURATE * _largest(ready, found), _noise(ready, steps))
-    design = found[:, :, n] if from_design else None
-    return Gradients(found[:, :, :n], design, error, accurate, messages)
-
-
-def _size(study: Study, coordinate: int) -> float:
-    """Return a coordinate's size: the mechanism's size, one radian, or the size of the load."""
-    variation = study.variation
-    each = variation.coordinates[coordinate]
-    if each.unit in ("m", "rad"):
-        return size(study.case) if each.unit == "m" else 1.0
-    (number,) = np.flatnonzero(variation.moves[:, coordinate])
-    return float(abs(variation.nominal[number])) or each.scale
-
-
-def _largest(ready: Ready, found: Array) -> Array:
-    """Return the largest size of each row's gradients by coordinates of the same unit,
-    shape (coordinates, rows).
-    """
-    units = [each.unit for each in ready.study.variation.coordinates]
-    largest = np.fmax.reduce(np.abs(found), axis=2)
-    return np.array(
-        [
-            np.fmax.reduce(largest[[k for k, other in enumerate(units) if other == unit]], axis=0)
-            for unit in units
-        ]
-    )
-
-
-def _noise(ready: Ready, steps: Array) -> Array:
-    """Return the round-off of a zero difference, shape (coordinates, rows)."""
-    sizes = [size(ready.study.case) if row.unit == "m" else 1.0 for row in ready.study.rows]
-    values = np.fmax(np.fmax.reduce(np.abs(ready.nominal), axis=1), sizes)
-    return ROUND_OFF * values / steps[:, None]
+    solved = made.on_path(path).solve(variation.nominal[:, None], study.tol)
+    found = {(name, order): each for name, order, each in solved.slopes(variation.moves)}
+    rows = [found[each.output.name, each.derivative][:, :, 0] for each in study.rows]
+    along = np.stack(rows, axis=1)
+    return Gradients(along[:, :, :n], along[:, :, n] if start.starts_at_design else None)

@@ -243,7 +243,7 @@ def sweep_designs(
         if stopped is None or not found.count:
             raise
         stopped(reason)
-    slopes = gradients(ready)
+    slopes = gradients(study)
     exact = (
         study.subset >= 1.0
         and variation.mode is not Mode.MONTE_CARLO
@@ -280,9 +280,6 @@ def sweep_designs(
         incomplete=str(incomplete),
         quantiles_of=kept[0].kept,
         gradients=results.gradient_table(study, slopes),
-        gradient_messages={
-            variation.coordinates[k].name: message for k, message in sorted(slopes.messages.items())
-        },
         effects=results.effect_table(study, np.concatenate(found.effects, axis=1)),
         unsolved=found.failures,
         failed=[*found.unsolved],

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ...case.io.table_file import csv_text
-from ...errors import labelled, number_of
+from ...errors import labelled, number_of, shortened
 from ...harness.labels import notes, number
 from ...report import terminal
 from ...report.table import print_signs
@@ -174,6 +174,17 @@ def scaled_number(scale: float, value: float | None) -> str:
     return number(None if value is None else scale * value)
 
 
+def without_gradients(results: SweepResults) -> list[str]:
+    """Return a line on the outputs without gradients, if there are any."""
+    known = {each.output for each in results.gradients if each.largest is not None}
+    names = [name for name in results.outputs if name not in known]
+    why = (
+        "they have no value at the nominal design, or are forces near a singular pose or of rows"
+        " redundant but for digits"
+    )
+    return [f"no gradients of {shortened(names, 5)}: {why}"] if names else []
+
+
 def remarks(results: SweepResults) -> list[str]:
     """Return remarks on the numbers, a line each."""
     lines = [labelled(note) for _, note in notes(results.run)]
@@ -192,15 +203,7 @@ def remarks(results: SweepResults) -> list[str]:
     ]
     if len(results.deviating) > 10:
         lines.append(f"deviating: {len(results.deviating)} in all, listed in the results")
-    rough = sum(not each.accurate for each in results.gradients)
-    if rough:
-        lines.append(
-            f"{rough} of {len(results.gradients)} gradients are not known to 1e-6; the results say"
-            " which, and how well"
-        )
-    lines += [
-        f"no gradient by {name}: {message}" for name, message in results.gradient_messages.items()
-    ]
+    lines += without_gradients(results)
     if results.quantiles_of < results.samples:
         lines.append(
             f"quantiles are of a random subset of {results.quantiles_of} variants, with their"
@@ -283,18 +286,17 @@ def envelope_csv(results: SweepResults) -> str:
 
 def gradient_csv(results: SweepResults) -> str:
     """Return a line for each output and coordinate."""
-    numbers = ("at_design", "largest", "error")
-    columns = ["output", "coordinate", "unit", "at_design", "largest", "sample", "error"]
-    columns += ["accurate", "scale", "scale_unit", "standard_deviation", "effect", "effect_unit"]
+    columns = ["output", "coordinate", "unit", "at_design", "largest", "sample"]
+    columns += ["scale", "scale_unit", "standard_deviation", "effect", "effect_unit"]
     rows: list[Sequence[Any]] = []
     for each in results.gradients:
         unit, scale = results.shown_unit(results.outputs[each.output].unit)
         its, factor = results.shown_unit(results.unit_of(each.coordinate))
-        at, largest, error = scale_values(scale / factor, [getattr(each, key) for key in numbers])
+        at, largest = scale_values(scale / factor, [each.at_design, each.largest])
         rows.append(
             [
                 *(each.output, each.coordinate, f"({unit})/({its})"),
-                *(at, largest, each.sample, error, each.accurate),
+                *(at, largest, each.sample),
                 *(factor * each.scale, its, factor * each.deviation, scale * effect(each), unit),
             ]
         )

@@ -9,7 +9,7 @@ and a single variant can be reproduced.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from functools import cached_property, lru_cache
@@ -24,6 +24,7 @@ from ...caches import cache_last
 from ...errors import KincheckError
 from ...trajectory import Array
 from .study_choices import Mode, Sampling
+from .varied_places import Moves
 
 
 class Law(StrEnum):
@@ -347,14 +348,10 @@ class Coordinate:
 
 
 @dataclass(frozen=True, eq=False)
-class Variation:
-    """The varied coordinates, and their linear effect on geometry: nominal + moves @ offsets.
+class Variation(Moves):
+    """The varied coordinates, and the moves of places by their offsets.
 
     Attributes:
-        places: names of the varied places (see `kinematics.formulation.parameters.places`), each
-            with its count of numbers.
-        nominal: numbers of the varied places at the nominal design [m or -], shape (numbers,).
-        moves: changes of these numbers per unit offset, shape (numbers, coordinates).
         correlations: correlations of drawn coordinates, each coordinate in one of them at most.
         sampling: choice of the drawn points.
         drawn: number of drawn variants; a Latin hypercube depends on it.
@@ -364,9 +361,6 @@ class Variation:
 
     mode: Mode
     coordinates: tuple[Coordinate, ...]
-    places: Mapping[str, int]
-    nominal: Array
-    moves: Array
     correlations: tuple[Correlation, ...] = ()
     sampling: Sampling = Sampling.RANDOM
     drawn: int = 0
@@ -404,32 +398,6 @@ class Variation:
         # only a Latin hypercube depends on the number; other samplings keep none
         drawn = count if sampling is Sampling.LATIN else 0
         return replace(self, sampling=sampling, drawn=drawn)
-
-    def geometry(self, offsets: Array) -> Array:
-        """Return numbers of the varied places, shape (numbers, V), from offsets, shape
-        (coordinates, V).
-
-        The sum is computed term by term, as the rounding of a matrix product may depend on the
-        number of columns and on the machine.
-        """
-        found = np.repeat(self.nominal[:, None], offsets.shape[1], axis=1)
-        for number, coordinate in np.argwhere(self.moves).tolist():
-            found[number] += self.moves[number, coordinate] * offsets[coordinate]
-        return found
-
-    def values(self, offsets: Array) -> dict[str, tuple[float, ...]]:
-        """Return the value of each varied place of one variant; offsets of shape (coordinates,)."""
-        numbers = self.geometry(offsets[:, None])[:, 0].tolist()
-        return {place: tuple(numbers[own]) for place, own in self.slices.items()}
-
-    @cached_property
-    def slices(self) -> dict[str, slice]:
-        """The numbers of each varied place in the geometry."""
-        found: dict[str, slice] = {}
-        first = 0
-        for place, count in self.places.items():
-            found[place] = slice(first, first := first + count)
-        return found
 
     def offsets(self, seed: int, first: int, count: int) -> Array:
         """Return offsets of variants from the nominal design [units], (coordinates, count)."""

@@ -33,7 +33,7 @@ from .variation_schema import (
     VaryKeys,
     VaryUnits,
 )
-from .varied_places import Geometry, PlaceError, Variable
+from .varied_places import Geometry, Moves, PlaceError, Variable, by_place
 
 
 def unit_of_offsets(
@@ -377,28 +377,22 @@ class _Reader:
                 "hardpoints",
                 "nothing varies, expected an offset other than 0. Give one.",
             )
-        moves: dict[str, Array] = {}
-        column = 0
-        for block in blocks.values():
-            for number, _ in block.coordinates:
-                for place, each in block.moved.moves.items():
-                    still = np.zeros((len(each), len(coordinates)))
-                    moves.setdefault(place, still)[:, column] = each[:, number]
-                column += 1
+        moves = by_place(
+            [each.moved.columns[k] for each in blocks.values() for k, _ in each.coordinates]
+        )
         for name, table in self.keys.lines.items():
             self._line(join("lines", name), table, moves)
         self._check_drivers(moves)
-        values = self.geometry.values
         units = FileUnits(
             self.units.length or self.case.length_unit, self.units.angle or self.case.angle_unit
         )
         return Variation(
-            self.keys.mode,
-            tuple(coordinates),
-            {place: len(values[place]) for place in moves},
-            np.array([number for place in moves for number in values[place]]),
-            np.concatenate(list(moves.values())),
-            read_correlations(self.file, self.keys, [each.name for each in coordinates]),
+            **vars(Moves.of(self.geometry.values, moves)),
+            mode=self.keys.mode,
+            coordinates=tuple(coordinates),
+            correlations=read_correlations(
+                self.file, self.keys, [each.name for each in coordinates]
+            ),
             limits=read_limits(self.file, self.keys.limits, self.case, units),
             units=units,
         )

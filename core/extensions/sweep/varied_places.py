@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 
@@ -49,9 +50,66 @@ class Variable:
         return [self.name] if alone else [f"{self.name} {axis}" for axis in "xyz"]
 
     @property
+    def columns(self) -> list[dict[str, Array]]:
+        """Derivatives of the numbers of each place that follows, by each of its own numbers."""
+        count = range(len(self.numbers))
+        return [{place: each[:, k] for place, each in self.moves.items()} for k in count]
+
+    @property
     def places(self) -> list[str]:
         """The places that follow, without those of markers."""
         return [place for place in self.moves if not place.startswith(f"points.{MARKER}")]
+
+
+def by_place(columns: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    """Return derivatives of places, each by the numbers of all columns, shape (numbers of the
+    place, columns), from those by each column, shape (numbers of the place,).
+    """
+    found: dict[str, Array] = {}
+    for k, column in enumerate(columns):
+        for place, each in column.items():
+            found.setdefault(place, np.zeros((len(each), len(columns))))[:, k] = each
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """Numbers of varied places that follow offsets: nominal + moves @ offsets.
+
+    Attributes:
+        places: names of the varied places (see `kinematics.formulation.parameters.places`), each
+            with its count of numbers.
+        nominal: numbers of the varied places at the nominal design [m or -], shape (numbers,).
+        moves: changes of these numbers per unit offset, shape (numbers, offsets).
+    """
+
+    places: Mapping[str, int]
+    nominal: Array
+    moves: Array
+
+    @staticmethod
+    def of(values: Mapping[str, Sequence[float]], moves: Mapping[str, Array]) -> Moves:
+        """Return the moves of places with these values, from their derivatives by place."""
+        sizes = {place: len(values[place]) for place in moves}
+        nominal = np.array([number for place in moves for number in values[place]], dtype=float)
+        return Moves(sizes, nominal, np.concatenate([*moves.values()]))
+
+    def geometry(self, offsets: Array) -> Array:
+        """Return numbers of the varied places, shape (numbers, V), from offsets, shape
+        (offsets, V).
+
+        The sum is computed term by term, as the rounding of a matrix product may depend on the
+        number of columns and on the machine.
+        """
+        found = np.repeat(self.nominal[:, None], offsets.shape[1], axis=1)
+        for number, offset in np.argwhere(self.moves).tolist():
+            found[number] += self.moves[number, offset] * offsets[offset]
+        return found
+
+    def values(self, offsets: Array) -> dict[str, tuple[float, ...]]:
+        """Return the value of each varied place of one variant, by offsets of shape (offsets,)."""
+        numbers = iter(self.geometry(offsets[:, None])[:, 0].tolist())
+        return {place: tuple(islice(numbers, count)) for place, count in self.places.items()}
 
 
 class Geometry:
@@ -127,16 +185,8 @@ class Geometry:
         """Return the derivatives of each place without loads by all numbers of the variables, shape
         (numbers of the place, numbers of the variables).
         """
-        count = sum(len(each.numbers) for each in variables)
-        found: dict[str, Array] = {}
-        first = 0
-        for each in variables:
-            own = slice(first, first := first + len(each.numbers))
-            for place, slopes in each.moves.items():
-                if not place.startswith(_LOADS):
-                    still = np.zeros((len(slopes), count))
-                    found.setdefault(place, still)[:, own] = slopes
-        return found
+        found = by_place([column for each in variables for column in each.columns])
+        return {place: each for place, each in found.items() if not place.startswith(_LOADS)}
 
     def only(self, whole: Variable, chosen: Iterable[str]) -> Variable:
         """Return a variable that moves the chosen places alone, with the markers beside them."""

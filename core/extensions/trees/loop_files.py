@@ -66,6 +66,7 @@ LARGEST_FILE = 4_000_000
 LOOPS = "loop_closures"
 # The folder of the URDF, and in a package of ROS that of the package, beside urdf/.
 _PLACES = ("", "config/", "../", "../config/")
+_LOOPS = ".*(?:loop|closure|closed|constraint).*"
 _CLOSES = re.compile(r"loop|clos|constrain|mimic|coupl|equal")
 MOST_NAMED = 8
 SCHEMA = "kincheck-constraints/1"
@@ -270,11 +271,7 @@ def read_loop_files(root: Element) -> LoopFiles:
             types[name] = _TYPES.get(kind, kind.removeprefix("UJOINT_"))
         types |= dict.fromkeys(pairs.ball_upgrades, "spherical")
         found.append((paired, pairs))
-    notes += [
-        f"{WARNING}{each} beside it may close loops, and is not read; write them as <constraint>"
-        for each in _others(file)
-        if file.parent / each not in {own, *beside}
-    ]
+    notes += unread_beside(file, own, *beside)
     return LoopFiles(constraints, found, types, notes)
 
 
@@ -287,25 +284,36 @@ def _paired(file: Path) -> list[Path]:
     return [each for each in (*own, *(folder / name for name in places)) if each.is_file()]
 
 
-def _others(file: Path) -> list[str]:
-    """Return the names of other files beside a URDF, by which they may hold its loops."""
+def unread_beside(file: Path, *read: Path) -> list[str]:
+    """Return a warning for each file beside a model that may hold its loops, by its name.
+
+    Args:
+        read: files beside a URDF that are read; none of another format, whose model may lie beside
+            the URDF that has them.
+    """
     try:
         names = [each.name for each in os.scandir(file.parent) if each.is_file()]
     except OSError:
         return []
-    stem = re.escape(file.stem)
+    if not read and any(name.lower().endswith(".urdf") for name in names):
+        return []
     data = r"\.(?:ya?ml|json|toml)"
-    other = re.compile(rf"{stem}{data}|.*(?:loop|closure|closed|constraint).*{data}", re.IGNORECASE)
+    own = rf"|{re.escape(file.stem)}{data}" * bool(read)
+    other = re.compile(rf"{_LOOPS}(?:{data}|\.(?:xml|csv|txt|ini|cfg)){own}", re.IGNORECASE)
     robots = [Path(name).stem for name in names if name.endswith(file.suffix)]
 
     def is_own(name: str) -> bool:
         owner = max((each for each in robots if name.startswith(each)), key=len, default=file.stem)
-        if owner != file.stem:
+        if owner != file.stem or file.parent / name in {file, *read}:
             return False
         with (file.parent / name).open("rb") as data:  # what kincheck writes begins with its schema
             return b"kincheck-" not in data.read(200)
 
-    return sorted(name for name in names if other.fullmatch(name) and is_own(name))
+    return [
+        f"{WARNING}{name} beside it may close loops, and is not read; write them into {file.name}"
+        for name in sorted(names)
+        if other.fullmatch(name) and is_own(name)
+    ]
 
 
 def _text(file: Path) -> str:

@@ -152,11 +152,15 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
     Raises:
         CaseError: it is no such model, or something in it makes no sense.
     """
+    from .loop_files import unread_beside
+
     root = root_of(file)
     reader = next((each for each in _formats() if each.tag == root.tag), MJCF)
     omitted: list[tuple[str, Element]] = []
     tree = reader.tree(reader.whole(root).without_named(without, omitted))
     tree.without = {name for name, _ in omitted}
+    if reader is not URDF:
+        tree.notes += unread_beside(file)
     if omitted:
         tree.notes.append(f"{WITHOUT}{', '.join(str(each) for _, each in omitted)}")
     return tree

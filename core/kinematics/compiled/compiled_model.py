@@ -1,8 +1,9 @@
 """A mechanism made ready to be swept: its rows selected, its programs traced, its lanes laid out.
 
 Programs with their layout are kept on disk beside their machine code. The key of an entry is the
-mechanism, the request and all source files of tracing: a change of any of them traces anew. Joint
-types of the user are traced every time, because their source may be anywhere.
+mechanism, the request and all source files of tracing and of the wanted outputs: a change of any of
+them traces anew. Joints and outputs of the user are traced every time, because their source may be
+anywhere.
 """
 
 from __future__ import annotations
@@ -11,9 +12,11 @@ import hashlib
 import os
 import pathlib
 import pickle
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -43,6 +46,7 @@ from .request import (
     SMALLEST_OF_PARTS,
     TIME,
     Request,
+    WantedOutput,
     kept_forces,
     kept_motions,
     kept_outputs,
@@ -59,6 +63,9 @@ if TYPE_CHECKING:
 
 CORE = pathlib.Path(__file__).parents[2]
 PACKAGE = __name__.split(".kinematics.")[0]
+OURS = PACKAGE.partition(".")[0]
+KNOWN = {OURS, "numpy", *sys.stdlib_module_names}
+"""Packages whose sources are known, or do not change what is traced."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +105,13 @@ def load_or_trace(mechanism: Mechanism, request: Request, alike: Alike | None = 
     compiled = compiler() if request.compiled else None
     lanes = compiled.width if compiled else NODES  # numpy's are as many or more
     own = is_builtin(mechanism) and request.style in (NATIVE, MIXED)
-    if alike or request.varied or not (own and compiled):
+    modules = modules_of(request.outputs)
+    foreign = {each.partition(".")[0] for each in modules} - KNOWN
+    if alike or foreign or not (own and compiled):
         return _trace(mechanism, request, alike, lanes)
-    content = _source() + pickle.dumps((mechanism, request, lanes))
+    files = {sys.modules[each].__file__ for each in modules if each.startswith(f"{OURS}.")}
+    folders = sorted({os.path.dirname(each) for each in files if each})
+    content = _source(*folders) + pickle.dumps((mechanism, request, lanes))
 
     def made() -> bytes:
         return msgspec.msgpack.encode(_trace(mechanism, request, None, lanes), enc_hook=_plain)
@@ -122,11 +133,33 @@ def is_builtin(mechanism: Mechanism) -> bool:
     return all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)
 
 
+class _Modules(pickle.Pickler):
+    """Finds the modules of all classes and functions of what it writes."""
+
+    def __init__(self) -> None:
+        super().__init__(BytesIO())
+        self.found = set[str]()
+
+    def reducer_override(self, obj: Any) -> Any:
+        """Note the modules of an object, and write it as usual."""
+        cls: type[Any] = obj if isinstance(obj, type) else type(obj)
+        self.found |= {obj.__module__, *(each.__module__ for each in cls.__mro__)}
+        return NotImplemented
+
+
+def modules_of(outputs: Sequence[WantedOutput]) -> set[str]:
+    """Return the modules of the equations of outputs, and of all that they are made of."""
+    modules = _Modules()
+    modules.dump(outputs)
+    return modules.found
+
+
 @cache
-def _source() -> bytes:
-    """Return a digest of the source files of tracing."""
+def _source(*folders: str) -> bytes:
+    """Return a digest of the source files of tracing, and of those in folders."""
     digest = hashlib.sha256()
-    for name in source_files():
+    own = (os.path.join(at, name) for at in folders for name in sorted(os.listdir(at)))
+    for name in (*source_files(), *(each for each in own if each.endswith(".py"))):
         with open(name, "rb", buffering=0) as file:
             digest.update(file.read())
     return digest.digest()
@@ -205,7 +238,7 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
         rows,
         tracer.blocks,
         tracer.selection,
-        tracer.frame,
+        tracer.described[1],
     )
 
 

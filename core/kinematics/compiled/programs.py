@@ -40,6 +40,7 @@ from ..formulation.styles import NATIVE, formulate
 from ..structure.degrees_of_freedom import Selection, select_rows
 from .request import (
     BLOCKS,
+    CARRIED,
     FIRM,
     ORIENTATION,
     PRESCRIBED,
@@ -120,7 +121,7 @@ class Tracer:
         else:
             self.frame, known = frame or frames(mechanism), every_place(mechanism)
             self.geometry = {place: known[place] for place in request.varied}
-        self._described = mechanism, self.frame  # without traced numbers
+        self.described = mechanism, self.frame  # without traced numbers
         given = {place: self.vector(place, len(value)) for place, value in self.geometry.items()}
         slots = {slot for place in given for slot in self.layout.vectors[place]}
         self.prepared = Prepared(self.tape, slots, self.layout.scalar)
@@ -192,8 +193,8 @@ class Tracer:
         """Raises SolveError: the mechanism cannot be solved as described, see `select_rows`."""
         if self._alike:
             return self._alike.select()
-        formulation = self.formulate(*self._described, {})
-        return select_rows(*self._described, formulation, self.request.rows)
+        formulation = self.formulate(*self.described, {})
+        return select_rows(*self.described, formulation, self.request.rows)
 
     def chosen(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.chosen]
@@ -306,14 +307,23 @@ class Tracer:
                 out, ("p", "omega", "omega_t"), name, motion_of_frame(p, *moving(name))
             )
         further(out, v, a)
-        if self.request.forces:
-            twists = self.formulation.twists(self.at, v)
-            accelerations = self.formulation.accelerations(self.at, v, a)
-            states = BodyStates(self.frame, self.at.poses, twists, accelerations)
-            forces = TracedForces(self.mechanism, self._native_rows(), states, self.at, self.drives)
-            for name, value in forces.vectors(self.request.forces):
+        if wanted := self.request.forces:
+            forces = self.forces(v, a)
+            for name, value in forces.vectors(wanted):
                 self.store(out, name, value)
+            if wanted.slopes:
+                self.store(out, CARRIED, forces.multipliers)
         return program("outputs", self.tape, out, self.prepared)
+
+    def forces(
+        self, v: Sequence[Scalar], a: Sequence[Scalar], multipliers: Sequence[Scalar] = ()
+    ) -> TracedForces:
+        """Return the forces at rates of the unknowns; see `TracedForces`."""
+        twists = self.formulation.twists(self.at, v)
+        accelerations = self.formulation.accelerations(self.at, v, a)
+        states = BodyStates(self.frame, self.at.poses, twists, accelerations)
+        rows = self._native_rows
+        return TracedForces(self.mechanism, rows, states, self.at, self.drives, multipliers)
 
     def moving(self, v: Sequence[Scalar], a: Sequence[Scalar]) -> Moving:
         """Return the motion of each body at unknown rates v and accelerations a, by its name."""
@@ -326,6 +336,7 @@ class Tracer:
 
         return found
 
+    @cached_property
     def _native_rows(self) -> Rows:
         if self.request.style == NATIVE:
             return Rows(self.formulation, self.selection, self.factor)

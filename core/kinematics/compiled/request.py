@@ -50,13 +50,14 @@ class WantedOutput:
         derivative: highest wanted time derivative.
         alone: drivers that alone move for it at each sample, at a rate of one; none of them for the
             rates of the motion itself.
-        slopes: whether its slopes by the varied geometry are wanted.
+        slopes: how many of value, rate and second rate have their slopes by the varied geometry
+            wanted.
     """
 
     equation: Equation
     derivative: int = 0
     alone: tuple[str, ...] = ()
-    slopes: bool = False
+    slopes: int = 0
 
 
 @dataclass(frozen=True)
@@ -96,11 +97,14 @@ class Request:
     @property
     def slopes(self) -> bool:
         """Whether slopes of any output are wanted."""
-        return any(each.slopes for each in self.outputs)
+        of_forces = self.forces is not None and self.forces.slopes
+        return of_forces or any(each.slopes for each in self.outputs)
 
 
-RATE, RATE_T = "rate", "rate_t"
-"""The vectors that hold the rates and accelerations of the unknowns."""
+RATE, RATE_T, CARRIED = "rate", "rate_t", "carried"
+"""The vectors that hold the rates and accelerations of the unknowns, and the multipliers of the
+rows.
+"""
 TIME = "time"
 PRESCRIBED = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
 """The vectors that tell how a prescribed body moves, and how many numbers each has [units and
@@ -221,7 +225,9 @@ OUTPUT, RESTING = "output ", "resting "
 have no value at rest.
 """
 SLOPE_OF, TOWARDS = "slope of ", "towards "
-"""Before the names of vectors of slopes: of the terms of an output; and the motion of a place."""
+"""Before the names of vectors of slopes: of a vector of an output or of a force; and the motion of
+a place.
+"""
 
 
 def kept_outputs(vectors: Iterable[str]) -> list[str]:

@@ -7,7 +7,7 @@ multipliers, by one more transposed solve; `ForceTable` orthonormalises these di
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 
@@ -78,6 +78,7 @@ class TracedForces:
         states: motion of its bodies.
         at: configuration, with the coordinates of `angles`.
         drives: of the moving drivers.
+        multipliers: of the solved rows; none if they are to be solved.
     """
 
     def __init__(
@@ -87,14 +88,29 @@ class TracedForces:
         states: BodyStates,
         at: Configuration,
         drives: Mapping[str, Drive],
+        multipliers: Sequence[Scalar] = (),
     ) -> None:
         self._mechanism, self._rows, self._states, self._drives = mechanism, rows, states, drives
         self._equations = ForceEquations.with_angles(mechanism, rows.formulation, at, states)
+        self.multipliers = multipliers or rows.factor.solve_transposed(self._equations.demand)
+
+    def moved(self, follow: Callable[[Sequence[Scalar]], Sequence[Scalar]]) -> list[Scalar]:
+        """Return the derivatives of the multipliers by a motion.
+
+        Args:
+            follow: returns the derivatives of numbers by the motion, multipliers held.
+        """
+        rows = self._equations.rows
+        left = [-x for x in self._equations.demand]
+        for k, value in zip(self._rows.selection.chosen, self.multipliers, strict=True):
+            for column, entry in rows[k].items():
+                left[column] = left[column] + entry * value
+        return [-x for x in self._rows.factor.solve_transposed(follow(left))]
 
     @cached_property
     def _multipliers(self) -> list[Scalar]:
         """Multipliers of all rows; zero of those left out."""
-        return self._of_rows(self._rows.factor.solve_transposed(self._equations.demand))
+        return self._of_rows(self.multipliers)
 
     @cached_property
     def _loose(self) -> list[list[Scalar]]:

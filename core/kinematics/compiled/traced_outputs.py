@@ -9,7 +9,10 @@ at held drivers moves the pose, its rates v and accelerations a by
     Phi_q dv = -d(Phi_q v - nu)       the derivative by pose and geometry, v held
     Phi_q da = -d(Phi_q a - gamma)    likewise, by v too
 
-with one factorisation for all, and outputs by the chain rule over their own operations.
+with one factorisation for all, and outputs by the chain rule over their own operations. So the
+multipliers l of the rows and the demand d of the bodies:
+
+    Phi_q^T dl = -d(Phi_q^T l - d)    likewise, l held
 """
 
 from __future__ import annotations
@@ -28,7 +31,19 @@ from ...program import Program, Traced, changes, program
 from ...trajectory import QUANTITIES
 from ..formulation.cartesian import Cartesian
 from ..formulation.formulation import Rows, motion_of_point
-from .request import OUTPUT, RATE, RATE_T, RESTING, SLOPE_OF, TOWARDS, WantedOutput
+from .request import (
+    CARRIED,
+    EFFORT,
+    ELEMENT,
+    OUTPUT,
+    RATE,
+    RATE_T,
+    REACTION,
+    RESTING,
+    SLOPE_OF,
+    TOWARDS,
+    WantedOutput,
+)
 
 if TYPE_CHECKING:
     from .programs import Moving, Tracer
@@ -92,8 +107,9 @@ class TracedOutputs:
         for name, derivatives in carried.items():
             add(tracer.vector(name, len(derivatives)), list(derivatives))
         rows = formulation.rows(tracer.at)
-        wanted = [each for each in self._wanted if each.slopes]
-        for alone in _groups(wanted):
+        wanted, forces = [each for each in self._wanted if each.slopes], tracer.request.forces
+        carried_too: list[tuple[str, ...]] = [()] if forces and forces.slopes else []
+        for alone in dict.fromkeys([*_groups(wanted), *carried_too]):
             own = self._formulation(alone) if alone else formulation
             v, a = self._read_rates(alone)
             if alone or tracer.request.order > 0:
@@ -101,8 +117,18 @@ class TracedOutputs:
             if alone or tracer.request.order > 1:
                 add(a, solve(_residuals(rows, a, own.gamma(tracer.at, v))))
             for each, terms, _ in self._evaluate(wanted, alone, v, a):
-                values = follow([term.x for term in terms])
-                tracer.store(out, f"{SLOPE_OF}{each.equation.name}", values)
+                for label, order in zip(QUANTITIES[: each.slopes], "xva", strict=False):
+                    values = follow([getattr(term, order) for term in terms])
+                    tracer.store(out, f"{SLOPE_OF}{OUTPUT}{label} {each.equation.name}", values)
+        if forces and forces.slopes:
+            v, a = self._read_rates(())
+            count = len(tracer.layout.vectors[CARRIED])
+            carrying = tracer.forces(v, a, tracer.vector(CARRIED, count))
+            add(carrying.multipliers, carrying.moved(follow))
+            for name, values in carrying.vectors(forces):
+                if name.startswith((REACTION, EFFORT, ELEMENT)):
+                    # without what redundant rows leave free
+                    tracer.store(out, f"{SLOPE_OF}{name}", follow(values[:6]))
         return program("slopes", tracer.tape, out, tracer.prepared)
 
     def _evaluate(

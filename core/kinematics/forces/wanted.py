@@ -13,11 +13,15 @@ from ...mechanism.mechanism import Mechanism
 class WantedForces:
     """Names of the joints with wanted reactions, of the drivers with wanted efforts, and of the
     wanted force elements.
+
+    Attributes:
+        slopes: whether their slopes by the varied geometry are wanted.
     """
 
     joints: tuple[str, ...]
     drivers: tuple[str, ...]
     elements: tuple[str, ...]
+    slopes: bool = False
 
 
 def wanted_forces(mechanism: Mechanism, names: Collection[str] | None) -> WantedForces:

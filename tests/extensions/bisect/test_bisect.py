@@ -110,13 +110,17 @@ def test_odd_releases_are_told(offline, capsys):
 
 
 def test_end_that_cannot_be_installed(offline, capsys):
-    for release in range(1, 5):
-        wheel(offline / "wheels", f"{release}.0", engine(term=float(release < 3)))
-    next(offline.glob("wheels/*-4.0-*")).write_bytes(b"")
-    status, document = found("crank.toml", "--from", "1.0", "--to", "4.0")
-    assert (status, document["not_installable"]) == (2, ["4.0"])
-    assert ends(document) == [("2.0", "3.0", "result", "2.0")]
-    assert "--to 4.0: cannot be installed" in capsys.readouterr().err
+    """And native completes a truth without rates."""
+    case(offline, "places", columns=2)
+    for release in range(1, 4):
+        wheel(offline / "wheels", f"{release}.0", engine(term=float(release < 2)))
+    next(offline.glob("wheels/*-3.0-*")).write_bytes(b"")
+    status, document = found("places.toml", "--from", "1.0", "--to", "3.0")
+    assert (status, document["not_installable"]) == (2, ["3.0"])
+    assert ends(document) == [("1.0", "2.0", "result", "1.0")]
+    (change,) = document["changes"][0]["cases"].values()
+    assert [each["against"] for each in change["curves"]] == ["native"]
+    assert "--to 3.0: cannot be installed" in capsys.readouterr().err
 
 
 @pytest.mark.nightly
@@ -129,16 +133,6 @@ def test_nobody_is_right_without_truth(offline):
     wheel(offline / "wheels", "3.0", engine(term=3.0))
     _, document = found("crank.toml", "--from", "2.0", "--to", "3.0")
     assert ends(document) == [("2.0", "3.0", "result", "neither")]
-
-
-def test_native_completes_truth_without_rates(offline):
-    case(offline, "places", columns=2)
-    for release in (1, 2):
-        wheel(offline / "wheels", f"{release}.0", engine(term=float(release < 2)))
-    status, document = found("places.toml", "--from", "1.0", "--to", "2.0")
-    assert (status, ends(document)) == (1, [("1.0", "2.0", "result", "1.0")])
-    (change,) = document["changes"][0]["cases"].values()
-    assert [each["against"] for each in change["curves"]] == ["native"]
 
 
 BAD = (
@@ -205,10 +199,7 @@ def test_other_copy_of_release_is_found(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("states", ["aaaab", "abbbb", "aabbc", "a-ab-b", "aaaa", "-ab-", "abcde"])
 def test_search_finds_steps(states):
-    seen = []
-
     def state(place):
-        seen.append(place)
         return None if states[place] == "-" else states[place]
 
     steps = [*changes(len(states), state, str.__ne__)]
@@ -216,7 +207,7 @@ def test_search_finds_steps(states):
     assert all(states[i] != states[j] for i, j in steps)
 
 
-@pytest.mark.parametrize("place", range(1, 64))
+@pytest.mark.parametrize("place", [1, 2, 21, 32, 43, 63])
 def test_search_takes_logarithm(place):
     seen = {}
     found = [*changes(64, lambda each: seen.setdefault(each, each >= place), bool.__ne__)]

@@ -1,5 +1,7 @@
 """Verdicts and digits do not depend on the blocks that a mechanism is solved by."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from kincheck import cases
@@ -14,6 +16,7 @@ from kincheck.core.kinematics.continuation.walk import follow_samples
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 
 from ...support.block_structures import LEAN, assert_alike, solve_as, torus, with_one_program
+from ...support.by_night import sparse_by_day
 from ...support.mechanisms import (
     BRANCH,
     chain,
@@ -41,16 +44,13 @@ IN_BLOCKS = pytest.mark.parametrize("method", METHODS[1:])
 @IN_BLOCKS
 @pytest.mark.parametrize(
     "name",
-    [
-        "mcpherson_strut",
-        "mcpherson_steered",
-        "four_bar",
-        "andrews_squeezer",
-        "delta_robot",
-        "bricard",
-        "double_cardan",
-        "rssr",
-    ],
+    sparse_by_day(
+        [
+            *("mcpherson_steered", "mcpherson_strut", "bricard", "four_bar"),
+            *("andrews_squeezer", "delta_robot", "double_cardan", "rssr"),
+        ],
+        2,
+    ),
 )
 def test_blocks_match_one_program(name, method):
     case = cases.load(name)
@@ -136,14 +136,13 @@ def test_limit_of_travel_has_one_verdict(method):
 
 
 @pytest.mark.parametrize(
-    ("rows", "columns", "crossed"),
-    [(2, 2, 2), (2, 3, 1), pytest.param(3, 3, 3, marks=pytest.mark.nightly)],
-    ids=["2x2", "2x3", "3x3"],
+    "size", sparse_by_day([(2, 2, 2), (2, 3, 1), (3, 3, 3)], 3), ids=["2x2", "2x3", "3x3"]
 )
-def test_torus_has_one_verdict(rows, columns, crossed):
+def test_torus_has_one_verdict(size):
     """Singular values vanish in pairs and in threes: neither pivots nor signs of determinants show
     it, estimates of singular values do.
     """
+    rows, columns, crossed = size
     mechanism, at = torus(rows, columns)
     turn = np.linspace(-0.5, 0.5, 32)
     for found in in_every_way(mechanism, turn, ("tip",)):
@@ -178,11 +177,11 @@ def test_bennett_loop_has_one_verdict():
             assert np.abs(found.points[name].position - motion.position).max() <= 1e-11
 
 
-@pytest.mark.parametrize("ends", ["distance", "hinges"])
 @pytest.mark.parametrize(
-    ("off", "reached"), [(0.0, 9), (1e-6, 5), pytest.param(1e-4, 5, marks=pytest.mark.nightly)]
+    "shape", sparse_by_day(product([(0.0, 9), (1e-6, 5), (1e-4, 5)], ["distance", "hinges"]), 6, 3)
 )
-def test_parallelogram_in_ring_has_one_verdict(off, reached, ends):
+def test_parallelogram_in_ring_has_one_verdict(shape):
+    (off, reached), ends = shape
     turn = np.linspace(0.0, -1.1, 9)
     for found in in_every_way(inside(off, ends), turn, ()):
         assert found.solved.sum() == reached

@@ -36,6 +36,7 @@ from ...support.block_structures import (
     solve_components,
     with_one_program,
 )
+from ...support.by_night import sparse_by_day
 from ...support.mechanisms import (
     LEAN,
     ORIGIN,
@@ -180,25 +181,33 @@ def at_design(lanes):
     lanes.set_prediction_start(0.0, PATH)
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_components_go_on_from_last_lane(compiled):
-    request = Request(("turn",), ("end",), compiled=compiled)
-    for count in (LANES, 5):  # all that there are, or the last ones are as the last
-        going, carrying = (ComponentLanes(chain(3), request) for _ in range(2))
-        for lanes in (going, carrying):
-            at_design(lanes)
-            for first in (0.0, 0.1, 0.2):  # there and back again
-                assert (lanes.attempt(first + np.linspace(0.005, 0.1, count), PATH) > 0.0).all()
-                if lanes is going:
-                    lanes.go_on()
-                else:
-                    lanes.carry(count - 1)
-        ends = [lanes.anchor(0.3).pose for lanes in (going, carrying)]
-        for a, b in zip(*ends, strict=True):
-            np.testing.assert_array_equal(a, b)
-        model = going.kinds[0].model
-        time = [*model.plan.fixed].index(model.slots[FROM + TIME])
-        assert ends[0][0][0, time] == pytest.approx(0.3)
+def test_walk_follows_as_attempts_do():
+    count, request = 2 * LANES + 5, Request(("turn",), ("end",))
+    walking, trying = both = [ComponentLanes(chain(3), request) for _ in range(2)]
+    for lanes in both:
+        at_design(lanes)
+    times = np.append(np.linspace(0.005, 0.3, count), [0.3] * LANES)
+    walked = walking.walk(walking.sample_tables(times, PATH), count)
+    for some in np.split(np.arange(count), [LANES, 2 * LANES]):
+        n = len(trying.attempt(times[some], PATH))
+        for each, tried in zip(walked, (trying.motions(n), trying.worst[:, :n]), strict=True):
+            np.testing.assert_array_equal(each[:, some], tried)
+        trying.carry(n - 1)
+    ends = [lanes.anchor(0.3).pose for lanes in both]
+    for a, b in zip(*ends, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert ends[0][0][0, walking.kinds[0].column[FROM + TIME]] == pytest.approx(0.3)
+
+
+def test_walk_stops_before_doubtful_samples():
+    lanes = ComponentLanes(chain(3), Request(("turn",), ("end",)))
+    times = np.full(2 * LANES, 0.005)
+    # the residual is below both; rounding leaves more than the second in doubt
+    for tol, followed in ((1e-12, LANES), (2e-18, 0)):
+        at_design(lanes)
+        lanes.accept_by({"tolerance": tol})
+        assert lanes.attempt(times[:1], PATH) > 0.0
+        assert lanes.walk(lanes.sample_tables(times, PATH), LANES)[1].shape[1] == followed
 
 
 @pytest.mark.parametrize(
@@ -234,7 +243,7 @@ def test_components_without_outputs():
 
 
 @pytest.mark.parametrize("lanes", [8, 16])
-@pytest.mark.parametrize("part", [1, 2, 7, 8, 9, 14, 15, 16, 17, 30, 31, 39])
+@pytest.mark.parametrize("part", sparse_by_day([1, 2, 7, 8, 9, 14, 15, 16, 17, 30, 31, 39], 3))
 def test_step_division_by_any_lanes(part, lanes):
     """Lanes are fewer than the parts of a step: those take turns, and no part counts whose half is
     not reached.

@@ -33,6 +33,7 @@ from kincheck.core.kinematics.structure.degrees_of_freedom import NullSpaces
 from kincheck.core.mechanism.motions import Path, Ramp
 
 from ...support.block_structures import chain_of_hinges, solve_sparse
+from ...support.by_night import sparse_by_day
 from ...support.mechanisms import Z, circles_meet, crank_tip, errors, planar_four_bar, solve_all
 
 CRANKS = 5
@@ -161,16 +162,21 @@ def test_parallelogram_in_line_goes_on(ends, grid):
 
 # where the rod's arms are in line with it, what is nearly a parallelogram turns back
 @pytest.mark.parametrize(
-    ("grid", "ends", "off", "end"),
-    [
-        ("coarse", "hinges", 1e-6, 0.57053),
-        ("middle", "distance", 1e-6, 0.57053),
-        ("fine", "hinges", 1e-6, 0.57053),
-        ("coarse", "distance", 1e-4, 0.56846),
-        ("middle", "hinges", 1e-4, 0.56846),
-    ],
+    "shape",
+    sparse_by_day(
+        [
+            ("coarse", "hinges", 1e-6, 0.57053),
+            ("middle", "distance", 1e-6, 0.57053),
+            ("fine", "hinges", 1e-6, 0.57053),
+            ("coarse", "distance", 1e-4, 0.56846),
+            ("middle", "hinges", 1e-4, 0.56846),
+        ],
+        3,
+    ),
+    ids=str,
 )
-def test_sparse_gap_ends_motion(off, end, ends, grid):
+def test_sparse_gap_ends_motion(shape):
+    grid, ends, off, end = shape
     turn = GRIDS[grid]
     found = swept(inside(off, ends), turn, order=0)
     assert found.solved.tolist() == (turn > -end).tolist()

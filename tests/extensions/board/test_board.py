@@ -437,9 +437,9 @@ def test_environment_engines_share_error(engine, rows, tmp_path):
         assert shorter == pytest.approx(0.5 * longer, rel=0.1)
 
 
-def test_board_urdf_equals_model(site):
+def test_board_urdf_equals_model(tmp_path):
     pin = pytest.importorskip("pinocchio")
-    truth = truth_of(kincheck.load(FOUR_BAR))
+    truth = truth_of(kincheck.load(short(tmp_path, 0.1, 3)))
     files = offers("steppers")["pybullet"].load().files(truth.case.mechanism, truth.twists)
     model, found = json.loads(files["model.json"]), pin.buildModelFromXML(files["model.urdf"])
     data = found.createData()

@@ -29,26 +29,24 @@ ROOT = Path(__file__).parents[3]
 HERE = "tests.support.faulty_engine"
 
 
-def reduce(monkeypatch, *joint_types, force_type):
+def reduce(patch, *joint_types, force_type):
     """Check these joint types, forces by one, and one topology."""
-    monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in joint_types])
-    monkeypatch.setattr(force_cases, "probes", lambda: [probe(force_type)])
-    monkeypatch.setattr(
-        "kincheck.core.extensions.check_engine.command.TOPOLOGIES", {"one loop": "rssr"}
-    )
+    patch.setattr(checking, "probes", lambda: [probe(each) for each in joint_types])
+    patch.setattr(force_cases, "probes", lambda: [probe(force_type)])
+    patch.setattr("kincheck.core.extensions.check_engine.command.TOPOLOGIES", {"one loop": "rssr"})
 
 
 @pytest.fixture
-def few(monkeypatch):
+def few(patch):
     """Modules of the tests are found by workers."""
-    monkeypatch.syspath_prepend(str(ROOT))
-    reduce(monkeypatch, Screw, Planar, Gear, force_type=Screw)
+    patch.syspath_prepend(str(ROOT))
+    reduce(patch, Screw, Planar, Gear, force_type=Screw)
 
 
 @pytest.fixture
-def in_process(monkeypatch):
+def in_process(patch):
     """Without worker processes: the checks that a faulty engine passes have them."""
-    monkeypatch.setattr(checking, "in_workers", lambda *_: solve_in_process)
+    patch.setattr(checking, "in_workers", lambda *_: solve_in_process)
 
 
 def failures(engine):
@@ -196,20 +194,20 @@ def test_rates_of_short_sweeps_are_skipped(samples, compared):
 
 
 @pytest.fixture
-def two(in_process, monkeypatch):
-    reduce(monkeypatch, Screw, Universal, force_type=Universal)
+def two(in_process, patch):
+    reduce(patch, Screw, Universal, force_type=Universal)
 
 
 @pytest.mark.parametrize("fault", sparse_by_day(OF_MOTION, 3))
-def test_check_engine_finds_fault_of_motion(fault, two, monkeypatch):
-    monkeypatch.setattr(checking, "force_cases", list)
+def test_check_engine_finds_fault_of_motion(fault, two, patch):
+    patch.setattr(checking, "force_cases", list)
     assert failures(Wrapped(fault))
 
 
 @pytest.mark.parametrize("fault", sparse_by_day(OF_FORCES, 3))
-def test_check_engine_finds_fault_of_forces(fault, two, monkeypatch):
-    monkeypatch.setattr(checking, "probes", list)
-    monkeypatch.setattr("kincheck.core.extensions.check_engine.command.TOPOLOGIES", {})
+def test_check_engine_finds_fault_of_forces(fault, two, patch):
+    patch.setattr(checking, "probes", list)
+    patch.setattr("kincheck.core.extensions.check_engine.command.TOPOLOGIES", {})
     found = failures(Wrapped(fault))
     assert any(check.startswith("forces: ") for check in found)
     assert not any(check.startswith(("rates: ", "refusal: ")) for check in found)

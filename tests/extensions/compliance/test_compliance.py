@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import kincheck
@@ -21,6 +22,7 @@ from kincheck.core.mechanism.loads import Bushing
 from kincheck.core.mechanism.mechanism import Point
 
 from ...kinematics.test_bushings import bushed
+from ...support.by_night import sparse_by_day
 from ...support.engine_motion import SIMULATORS, installed
 
 DATA = Path(__file__).parents[2] / "data" / "elastokinematics"
@@ -143,9 +145,12 @@ def test_kc_constant_load_acts_over_travel(tmp_path):
     assert found.wheel_load[0] == pytest.approx(row["wheel_load"], abs=1e-9)
 
 
-@pytest.mark.parametrize("convention", ["iso8855", "sae_j670"])
-@pytest.mark.parametrize("load", ["lateral", "longitudinal", "braking", "aligning"])
-def test_slopes_by_load_equal_differences(tmp_path, convention, load):
+LOADS = product(["lateral", "longitudinal", "braking", "aligning"], ["iso8855", "sae_j670"])
+
+
+@pytest.mark.parametrize("given", sparse_by_day(LOADS, 3), ids=str)
+def test_slopes_by_load_equal_differences(tmp_path, given):
+    load, convention = given
     case = strut(tmp_path, WHEEL.replace("CONVENTION", convention))
     results = compliance(case, [0.0], {load: [-1.0, 0.0, 1.0]})
     curve = results.loads[load]
@@ -190,6 +195,7 @@ def test_axle_wheel_rates_heave_and_roll():
     assert rolled.wheel_load[0] > found.travel.wheel_load[1]  # the bar is twisted
 
 
+@pytest.mark.nightly
 def test_free_axle_compliance_equals_data():
     """Both wheels are free in height; loads and displacements at their centres."""
     rows = AXLE["rows"]

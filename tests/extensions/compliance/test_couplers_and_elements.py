@@ -111,7 +111,7 @@ def test_equilibrium_equals_root(engine, name, tmp_path):
     assert record.outputs["tip.z"].position == pytest.approx([height], abs=1e-13)
 
 
-@pytest.mark.parametrize("name", sparse_by_day(SUBJECTS, 6))
+@pytest.mark.parametrize("name", sparse_by_day(SUBJECTS, 12))
 def test_free_motion_equals_integration(name, tmp_path):
     times = np.linspace(0.0, 0.5, 6)
     free = {"duration": 0.5, "samples": 6, "rates": {"pin": RATE}}

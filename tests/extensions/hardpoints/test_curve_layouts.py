@@ -123,15 +123,19 @@ def test_right_wheel_takes_right_columns(tmp_path, car):
     np.testing.assert_allclose(np.degrees(case.reference["toe"].position), TOE, atol=1e-5)
 
 
+@pytest.fixture(scope="module", params=[11, 17])
+def sampled(request, car, tmp_path_factory):
+    """The case by other samples, with its toe by both."""
+    fine = strut_of_table(tmp_path_factory.mktemp("fine"), f"0.05:{request.param}")
+    return fine, solved(fine)["toe"], np.degrees(solved(car)["toe"])
+
+
 @pytest.mark.parametrize("decimals", range(6))
-@pytest.mark.parametrize("samples", [11, 17])
-def test_rounded_curve_is_within_digits(tmp_path, car, decimals, samples):
+def test_rounded_curve_is_within_digits(tmp_path, sampled, decimals):
     """The curve of the case itself, at its samples and between rows, is off by the rounding."""
-    fine = strut_of_table(tmp_path, f"0.05:{samples}")
-    toe = np.degrees(solved(car)["toe"])
+    fine, expected, toe = sampled
     lines = ["Wheel travel [mm],Toe [deg]"]
     lines += [f"{x},{y:.{decimals}f}" for x, y in zip(TRAVEL, toe, strict=True)]
     case, _ = curve(tmp_path, fine, lines)
     known = case.reference["toe"]
-    off = np.abs(solved(fine)["toe"] - known.position)
-    assert (off <= known.uncertainty["position"] + 1e-12).all()
+    assert (np.abs(expected - known.position) <= known.uncertainty["position"] + 1e-12).all()

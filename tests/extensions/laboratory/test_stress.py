@@ -88,7 +88,7 @@ def test_stress_specimens_repeat_and_save(name, tmp_path):
         assert (read.sweep.values == case.sweep.values).all()
 
 
-@pytest.mark.parametrize("samples", [64, pytest.param(160, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("samples", [32, pytest.param(160, marks=pytest.mark.nightly)])
 def test_native_engine_never_silently_wrong(samples):
     """All families; the share of each in a run. Compiled: without machine code is
     another test.

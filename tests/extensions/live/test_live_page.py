@@ -15,22 +15,11 @@ from kincheck.core.extensions.live.model import LiveModel
 from kincheck.core.extensions.live.server import LiveServer
 from kincheck.core.extensions.live.table import LiveTable
 
-from ...support.browser import AXE, CHROMIUM, Browser
+from ...support.browser import AXE
 from .conftest import CAR, TRAVEL
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 
 BALL_JOINT = 2  # the row of uca_outer
 FIELD = "[aria-label='uca_outer y [mm]']"
-
-
-@pytest.fixture
-def browser(tmp_path):
-    browser = Browser(tmp_path / "profile")
-    yield browser
-    complaints = browser.complaints()
-    browser.close()
-    assert complaints == []
 
 
 def answered(browser):
@@ -255,8 +244,7 @@ def test_lost_server_keeps_numbers(opened, served):
 
 
 def test_live_page_fits_narrow_window(served, browser):
-    browser("Emulation.setDeviceMetricsOverride", width=900, height=900, deviceScaleFactor=1,
-            mobile=False)  # fmt: skip
+    browser.resize(900, 900)
     browser.visit(served.address)
     answered(browser)
     assert browser.run("return document.documentElement.scrollWidth <= innerWidth")

@@ -20,11 +20,9 @@ from kincheck.core.extensions.live.saved import saved_page
 from kincheck.core.extensions.live.table import LiveTable
 from kincheck.core.report.curves import write_curves
 
-from ...support.browser import CHROMIUM, Browser
 from .conftest import CAR
 from .test_live_page import FIELD, answered, drag, height, text, type_in, until_state
 
-in_browser = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 CLOSE = 1e-12
 """Largest difference [m, rad and per m], a thousand round-offs of steps that differ."""
 LARGEST = 1_500_000
@@ -48,15 +46,12 @@ def saved(car, monkeypatch):
 
 
 @pytest.fixture
-def browser(tmp_path):
-    browser = Browser(tmp_path / "profile")
+def browser(browser):
+    """A page that asks for nothing from a network."""
     browser("Network.enable")
     yield browser
     asked = [each for each in browser.events if each["method"] == "Network.requestWillBeSent"]
     addresses = {each["params"]["request"]["url"].partition(":")[0] for each in asked}
-    complaints = browser.complaints()
-    browser.close()
-    assert complaints == []
     assert addresses <= {"file", "blob"}
 
 
@@ -84,7 +79,6 @@ def assert_equals_curves(browser, case):
         np.testing.assert_allclose(known, values[0], rtol=CLOSE, atol=CLOSE, err_msg=name)
 
 
-@in_browser
 def test_saved_page_equals_curves(saved, browser, car):
     """Dragged, undone, and as CSV as the command writes it."""
     show(browser, saved("--travel", "0.03:21"))
@@ -114,7 +108,6 @@ def test_saved_page_equals_curves(saved, browser, car):
     np.testing.assert_allclose(*as_numbers, rtol=CLOSE, atol=1e3 * CLOSE)
 
 
-@in_browser
 def test_saved_axle_answers_quickly(saved, browser, car):
     show(browser, saved("--travel", "0.03:161", "--axle", "heave"))
     browser.click(FIELD)
@@ -132,10 +125,8 @@ def test_saved_axle_answers_quickly(saved, browser, car):
     assert text(browser, "#ranking td").startswith("tierod")
 
 
-@in_browser
 def test_saved_page_on_phone(saved, served, browser):
-    browser("Emulation.setDeviceMetricsOverride", width=400, height=800, deviceScaleFactor=1,
-            mobile=False)  # fmt: skip
+    browser.resize(400, 800)
     wide = (
         "return [...document.querySelectorAll('.plane canvas')].map((each) => each.clientWidth)"
         ".concat(document.documentElement.scrollWidth)"
@@ -149,7 +140,6 @@ def test_saved_page_on_phone(saved, served, browser):
         browser.events.clear()  # a served page is asked for
 
 
-@in_browser
 def test_saved_page_marks_lock_up(saved, browser, car):
     show(browser, saved("--travel", "0.06:21", "--axle", "steer"))
     case = kincheck.load(car, kincheck.Supplied(travel="0.06:21", axle="steer"))
@@ -163,7 +153,6 @@ def test_saved_page_marks_lock_up(saved, browser, car):
     browser.until("document.querySelector('#trouble').textContent.startsWith('20 samples')", 20)
 
 
-@in_browser
 def test_saved_page_saves_table(saved, browser, car):
     show(browser, saved("--travel", "0.03:5"))
     browser.run(
@@ -221,7 +210,6 @@ def test_page_is_not_saved(argv, said, car, monkeypatch, capsys):
     assert not car.with_name("p.html").exists()
 
 
-@in_browser
 def test_saved_page_moves_drivers(browser, tmp_path, monkeypatch):
     """By sliders, with the curves as the command writes them."""
     monkeypatch.chdir(tmp_path)

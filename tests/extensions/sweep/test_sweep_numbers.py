@@ -131,7 +131,7 @@ def test_page_gradients_equal_json(shown):
     rows = html.rows("Gradients")
     assert len(rows) == len(expected)
     for row, each in zip(rows, expected, strict=True):
-        values = [each[key] for key in ("coordinate", "at_design", "largest", "sample", "error")]
+        values = [each[key] for key in ("coordinate", "at_design", "largest", "sample")]
         assert_row(row, [*values, "(mm)/(mm)"])
     for row, each in zip(html.rows("What varies"), found["coordinates"], strict=True):
         assert_row(row, [each["name"], each["law"], MM * each["scale"], "", "mm"])

@@ -7,6 +7,7 @@ from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 from kincheck.core.extensions.trees.reader import read_tree
 
+from ...support.case_texts import write
 from ...support.model_files import driven
 from ...support.model_poses import coordinate, solution
 from ...support.urdf_texts import robot
@@ -78,7 +79,10 @@ def test_closures_of_others_are_noted(tmp_path):
     other = CLOSURE.replace("coupler", "p").replace("rocker", "q")
     (tmp_path / "loop_closures.yaml").write_text(other)
     (tmp_path / "robot.yaml").write_text("controller: {p: 1}")
-    unread = ("closed_loops.json", "robot.json", "kinematic-Loops.toml", "robot_two.txt")
+    unread = (
+        *("closed_loops.json", "robot.json", "kinematic-Loops.toml", "robot_closures.xml"),
+        "robot_two.txt",
+    )
     others = ("robot_two.urdf", "robot_two_loops.json")
     for name in (*unread, *others):
         (tmp_path / name).write_text("{}")
@@ -87,8 +91,27 @@ def test_closures_of_others_are_noted(tmp_path):
     assert "loop_closures.yaml beside it is of other links, and not read" in notes
     assert "robot.yaml: not read: line 1: controller" in notes
     said = [each.split(" beside")[0] for each in notes if "beside it may close loops" in each]
-    assert [each.removeprefix("warning: ") for each in said] == sorted(unread[:3])
+    assert [each.removeprefix("warning: ") for each in said] == sorted(unread[:4])
     assert any(each.startswith("warning: held by --hold-rest") for each in notes)
+
+
+@pytest.mark.parametrize("name", ["robot.sdf", "robot.xml"])
+def test_loops_beside_other_format_warn(name, tmp_path):
+    """Unless a URDF lies there, whose file it is."""
+    texts = {
+        "robot.sdf": "<sdf version='1.9'><model name='m'><link name='a'/></model></sdf>",
+        "robot.xml": "<mujoco><worldbody><body name='a'><freejoint/></body></worldbody></mujoco>",
+    }
+    file = write(tmp_path, texts[name], name)
+    assert not any("beside it" in note for note in read_tree(file).notes)
+    write(tmp_path, "closed_loop: []", "loop_closures.yaml")
+    said = (
+        "warning: loop_closures.yaml beside it may close loops, and is not read; write them into"
+        f" {name}"
+    )
+    assert said in read_tree(file).notes
+    write(tmp_path, "", "other.urdf")
+    assert said not in read_tree(file).notes
 
 
 FIVE_BAR = """<robot name="planar"><link name="base"/><link name="l"/><link name="l2"/>

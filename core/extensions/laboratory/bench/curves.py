@@ -36,7 +36,7 @@ def measure(case: Case, rounds: int, tol: float = 1e-12) -> dict[str, object]:
         raise KincheckError(f"bench curves: {case.name!r} has no rows. Give a table of hardpoints.")
     ready = prepare_curves(case, places)
     offsets = np.random.default_rng(SEED).normal(size=(DESIGNS, len(places))) * SCATTER
-    geometry, varied = ready.geometry(offsets), ready.outputs.designs.route.model.request.varied
+    geometry, varied = ready.varied.geometry(offsets.T), tuple(ready.varied.places)
     points = prepare_designs(
         NativeSolver(order=0), case.mechanism, case.sweep.path, varied, case.points
     )

@@ -204,4 +204,4 @@ def _every_hardpoint(case: Case) -> Variation:
     ]  # fmt: skip
     nominal = np.array([number for name in varied for number in known[name]])
     sizes = {name: len(known[name]) for name in varied}
-    return Variation(Mode.MONTE_CARLO, tuple(coordinates), sizes, nominal, np.eye(len(nominal)))
+    return Variation(sizes, nominal, np.eye(len(nominal)), Mode.MONTE_CARLO, tuple(coordinates))
