@@ -70,8 +70,9 @@ class CompareSteppers(Command):
 
         from ...case.io.atomic_files import write_all
         from ...harness.record import to_json
-        from ...report.sections import page, print_report
+        from ...report.sections import page
         from ..free.section import free_in
+        from ..reports.reports import print_report
         from . import run
         from .page import report
         from .results import Board, earlier_rows

@@ -4,7 +4,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["measured"],
+    needs=["measured", "reports"],
     commands={"compare": "command:Compare"},
     public={"compare": "command:Compare"},
 )

@@ -102,7 +102,7 @@ class Compare(_Formed, Command):  # pyright: ignore[reportUntypedBaseClass]
         """Do the work of the command line."""
         from ...case.io.table_file import WRITERS, Kind
         from ...cli.destinations import curves_of
-        from ...report.sections import deliver
+        from ..reports.reports import deliver
         from . import designs as views
 
         refuse(self.unwritable(*PAGE))
