@@ -12,6 +12,7 @@ from kincheck.core.case.io.document import Section, fault
 from kincheck.core.case.io.lines import join, keys_of, line_of
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.sweep.variation_file import read_variation
 
 from ..support.case_texts import edited, write
@@ -79,9 +80,9 @@ def line_with(text, number):
 def test_each_key_has_its_line(tree, seed):
     tree, numbers = numbered(tree)
     rng = random.Random(seed)
-    for text in (json.dumps(tree, indent=1), "\n".join(toml(tree, rng))):
+    for text, root in ((json.dumps(tree, indent=1), ""), ("\n".join(toml(tree, rng)), None)):
         for path, number in numbers.items():
-            assert line_of(path, keys_of(text)) == line_with(text, number), (path, text)
+            assert line_of(path, keys_of(text, root)) == line_with(text, number), (path, text)
 
 
 @settings(deadline=None, max_examples=25)
@@ -145,6 +146,19 @@ def test_file_beside_robot_has_line(tmp_path, name):
     with pytest.raises(CaseError) as found:
         load(write(tmp_path, robot, "robot.urdf"), driven("j:0:1:3"))
     assert all(part in str(found.value) for part in (name, *said.split(" ... ")))
+
+
+@pytest.mark.parametrize("ending", ["json", "yaml"])
+@pytest.mark.parametrize("head", ["", '{"units": "mm",\n"points":'])
+def test_point_in_list_has_line(tmp_path, ending, head):
+    """Of a list of points, alone or in a table; YAML reads JSON."""
+    pytest.importorskip("yaml")
+    points = [{"name": f"p{k}", "x": 1, "y": 2, "z": "1e999" if k == 2 else 3} for k in range(4)]
+    text = f"{head}\n{json.dumps(points, indent=0)}{'}' * bool(head)}"
+    line = line_with(text, "1e999")
+    said = rf"line {line}: (points)?\[2\]\.z \((points\.)?p2\.z\): found '1e999'"
+    with pytest.raises(CaseError, match=said):
+        read_hardpoints(write(tmp_path, text, f"points.{ending}"))
 
 
 def test_variation_is_named_with_line(tmp_path):

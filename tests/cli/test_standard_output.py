@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from kincheck.core.harness.record import from_json
 
+from ..support.by_night import sparse_by_day
+
 ROOT = Path(__file__).parents[2]
 KINCHECK = "import sys; from tests.support.fake_command import main; sys.exit(main())"
 RUN = "run first --engine native --jobs 0"
@@ -23,7 +25,7 @@ def kincheck(line, out=subprocess.PIPE, **env):
     )
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "utf-16"])
+@pytest.mark.parametrize("encoding", sparse_by_day(["utf-16", "ascii"], 2))
 def test_run_output_in_limited_encodings(encoding):
     done = kincheck(RUN, PYTHONIOENCODING=encoding)
     assert done.returncode == 0, done.stderr

@@ -7,13 +7,12 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from itertools import islice
 from pathlib import Path
 
 from ...doors import offers
 
 # A message is made in a second.
-LONGEST, MOST_KEYS = 4_000_000, 500_000
+LONGEST = 4_000_000
 # Tables of a case are three levels deep, rows of numbers two more. Deeper nesting only obscures a
 # message.
 DEEPEST = 16
@@ -36,13 +35,13 @@ def place(file: Path, key: str) -> str:
 
     The line is that of the closest table around it, if the file has no such key.
     """
-    suffix, line = file.suffix.lower(), 0
-    other = offers("lines").get(suffix)
-    if key and (other or suffix in {".toml", ".json"}):
+    kinds = {".toml": keys_of, ".json": _keys_of_json}
+    kinds |= {suffix: each.load() for suffix, each in offers("lines").items()}
+    read, line = kinds.get(file.suffix.lower()), 0
+    if read and key:
         with suppress(OSError, ValueError):
             if file.stat().st_size <= LONGEST:
-                text = file.read_text("utf-8-sig")
-                line = line_of(key, other.load()(text) if other else keys_of(text))
+                line = line_of(key, read(file.read_text("utf-8-sig")))
     return f"line {line}: {key}" if line else key
 
 
@@ -51,7 +50,7 @@ def line_of(key: str, keys: Iterable[tuple[str, int]]) -> int:
     it; 0 if there is none.
     """
     inside, closest, around = 0, "", 0
-    for path, line in islice(keys, MOST_KEYS):
+    for path, line in keys:
         if path == key:
             return line
         if not inside and _within(path, key):
@@ -62,16 +61,20 @@ def line_of(key: str, keys: Iterable[tuple[str, int]]) -> int:
 
 
 def _within(path: str, key: str) -> bool:
-    return path.startswith(key) and path[len(key) : len(key) + 1] in (".", "[", ":")
+    return path.startswith(key) and path[len(key) : len(key) + 1] in (".", "[", ":", " ")
 
 
-def keys_of(text: str) -> Iterator[tuple[str, int]]:
-    """Yield the path of each key and item of a TOML or JSON text, with its line."""
+def keys_of(text: str, value: str | None = None) -> Iterator[tuple[str, int]]:
+    """Yield the path of each key and item of a text of TOML, with its line; of JSON, if the text
+    is a value.
+
+    Args:
+        value: path of the value that stands here.
+    """
     heading, counts = "", Counter[str]()
     # the path of each open bracket, and the number of its item; None for a table
     above: list[tuple[str, int | None]] = []
     names: list[str] = []
-    value: str | None = None  # path of the value that stands here
     line, opened = 1, 0  # brackets of the heading that stands here
     for token in _TOKEN.findall(text):
         here, line = line, line + token.count("\n")
@@ -88,12 +91,10 @@ def keys_of(text: str) -> Iterator[tuple[str, int]]:
             value = None
         elif token == "," and item is not None:
             above[-1] = path, item + 1
-        elif token == "," or (token == "\n" and not above):
+        elif token == "," or (token == "\n" and not above and value != ""):
             value, names, opened = None, [], 0
         elif value is not None or token in {"\n", "."} or token[0] == "#":
             continue
-        elif token == "{":
-            above.append(("", None))
         elif token == "[":
             opened += 1
         elif token == "]" and names:
@@ -118,3 +119,7 @@ def _name(token: str) -> str:
     with suppress(ValueError):
         return json.loads(token) if token[0] == '"' else token.strip("'")
     return token
+
+
+def _keys_of_json(text: str) -> Iterator[tuple[str, int]]:
+    return keys_of(text, "")

@@ -142,7 +142,8 @@ class PreparedDesigns:
             found: result of `solve` for the geometry.
             towards: motions of the varied numbers, shape (numbers, motions).
         """
-        return slopes_of(self.route, found, geometry, towards)
+        wanted = self.route.model.request.slopes  # of forces that cannot be traced there are none
+        return slopes_of(self.route, found, geometry, towards) if wanted else {}
 
     def forces(self, found: Variants, geometry: Array, tol: float) -> ForcesOfDesigns | None:
         """Return the forces of solved designs; None where none are wanted.

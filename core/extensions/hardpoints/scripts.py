@@ -162,7 +162,7 @@ class _Script:
             if keys[0] in self._once and isinstance(target, ast.Name):
                 self.constants[keys[0]] = value
             where = f"line {each.lineno} "
-            for leaf in leaves_of(value, (*above, *keys)):
+            for leaf in leaves_of(value, (*above, *keys), ".".join((*above, *keys))):
                 yield replace(leaf, where=where + leaf.where)
 
     def value(self, node: ast.expr) -> Any:

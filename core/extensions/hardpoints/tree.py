@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
-from ...case.io.document import fault, parse, shown, unknown_name
+from ...case.io.document import check_values, fault, parse, parse_json, shown, unknown_name
+from ...case.io.lines import join
 from ...case.io.table import is_number
 from ...case.units import LENGTHS
 from ...errors import brief, remedy, sentence, shortened
@@ -131,8 +132,9 @@ def json_tree(file: Path, text: str) -> list[Leaf]:
     Raises:
         CaseError: not JSON.
     """
-    listed = text.lstrip().startswith("[")
-    return [*leaves_of(parse(file, f'{{"points": {text}}}' if listed else text))]
+    data = parse_json(file, text)
+    check_values(file, data)
+    return [*leaves_of(data)]
 
 
 def toml_tree(file: Path, text: str) -> list[Leaf]:
@@ -263,11 +265,16 @@ def with_unit(file: Path, facts: Mapping[str, str], units: Mapping[str, str]) ->
     return {"unit": stated, **facts} if unit else dict(facts)
 
 
-def leaves_of(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
-    """Yield the values of a tree; a list of numbers or texts is one value."""
+def leaves_of(value: Any, keys: Keys = (), path: str = "") -> Iterator[Leaf]:
+    """Yield the values of a tree; a list of numbers or texts is one value.
+
+    Args:
+        keys: names around the value.
+        path: its place in the file, for messages.
+    """
     if isinstance(value, Mapping):
         for key, each in cast("Mapping[str, Any]", value).items():
-            yield from leaves_of(each, (*keys, str(key)))
+            yield from leaves_of(each, (*keys, str(key)), join(path, str(key)))
         return
     items = cast("list[Any]", value) if isinstance(value, list) else []
     if isinstance(value, list) and (
@@ -275,9 +282,11 @@ def leaves_of(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
     ):
         for k, each in enumerate(items):
             name, unnamed = _split_name(each)
-            yield from leaves_of(unnamed, (*keys, name or f"[{k}]"))
+            yield from leaves_of(unnamed, (*keys, name or f"[{k}]"), f"{path}[{k}]")
     else:
-        yield Leaf(keys, value, ".".join(keys))
+        named = ".".join(keys)
+        same = named.replace(".[", "[") == path
+        yield Leaf(keys, value, path if same else f"{path} ({named})")
 
 
 def _split_name(item: Any) -> tuple[str, Any]:

@@ -25,7 +25,7 @@ from kincheck.core.extensions.sweep.statistics import (
 from kincheck.core.extensions.sweep.study import Ready, Study, gradients
 from kincheck.core.extensions.sweep.study_choices import Sampling
 from kincheck.core.extensions.sweep.sweep import sweep_designs
-from kincheck.core.extensions.sweep.tables import print_sweep
+from kincheck.core.extensions.sweep.tables import print_sweep, without_gradients
 from kincheck.core.extensions.sweep.variation import DRAWN, Law, Limit
 from kincheck.core.harness.compare import output_series
 from kincheck.core.jet import Jet
@@ -416,6 +416,22 @@ def test_gradients_of_rates_and_forces(tmp_path, study):
     assert np.isfinite(own).any(axis=2).all()
     np.testing.assert_array_equal(np.isnan(own), np.isnan(expected))
     assert np.nanmax(np.abs(own - expected) / round_off) < 1.0
+
+
+def test_untraced_forces_have_no_gradients(tmp_path, monkeypatch):
+    """As of rows that are redundant but for digits: the values are there, and the table says why
+    their gradients are not.
+    """
+    tracing = "kincheck.core.kinematics.compiled.traced_forces"
+    monkeypatch.setattr(f"{tracing}.can_trace", lambda mechanism: False)
+    study = redundant(tmp_path)
+    case = replace(study.case, outputs=tuple(each for each in study.case.outputs if each.forces))
+    assert np.isnan(gradients(replace(study, case=case, order=0)).along).all()
+    found = sweep_designs(case, study.variation, samples=2)
+    assert all(each.largest is None for each in found.gradients)
+    assert found.unsolved == 0
+    (line,) = without_gradients(found)
+    assert line.startswith("no gradients of crank_torque")
 
 
 # Distributions, samplings and correlations of drawn variants, held against scipy's
