@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ..core.case.case import Case
 from ..core.harness.native_engine import NativeEngine
 from ..core.kinematics import LAST_ITERATION
 
@@ -32,6 +31,3 @@ class Native(NativeEngine):
             label: replace(self, solver=replace(self.solver, last_iteration=last))
             for label, last in EFFORTS.items()
         }
-
-    def floor(self, case: Case) -> None:
-        """Return None: the engine's loop is compiled."""

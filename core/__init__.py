@@ -36,12 +36,7 @@ if TYPE_CHECKING:
         Translational,
         Universal,
     )
-    from .kinematics import (
-        Curve,
-        Event,
-        solve,
-        trace,
-    )
+    from .kinematics import solve
     from .mechanism.mechanism import GROUND, Body, Mechanism, Point
     from .mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Ramp, Sine, Table
     from .studies.checks.check_joint import check_joint
@@ -56,11 +51,9 @@ __all__ = [
     "Case",
     "CaseError",
     "ConstantVelocity",
-    "Curve",
     "Cylindrical",
     "Distance",
     "Engine",
-    "Event",
     "Fixed",
     "Gear",
     "InPlane",
@@ -102,7 +95,6 @@ __all__ = [
     "check_joint",
     "clear_caches",
     "solve",
-    "trace",
 ]
 
 _NAMES = {
@@ -118,7 +110,7 @@ _NAMES = {
     ),
     "case.case": "Case",
     "case.io.reader_options": "Supplied",
-    "kinematics": ("Curve Event solve trace"),
+    "kinematics": "solve",
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",
     "studies.checks.check_joint": "check_joint",

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, cast
 
 from .errors import KincheckError
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
+    from typing import Unpack
 
 FOLDERS = "kincheck.core.extensions", "kincheck.adapters"
 """Packages whose subpackages may be extensions."""
@@ -28,14 +29,11 @@ GROUP = "kincheck.extensions"
 _Table = Mapping[str, str]
 
 
-@dataclass(frozen=True)
-class Extension:
-    """Offers of an extension. A value "module:name" is an object in a module of its folder, which
-    is imported on use.
+class Doors(TypedDict, total=False):
+    """Offers of an extension by kind. A value "module:name" is an object in a module of its folder,
+    which is imported on use.
 
     Attributes:
-        package: `__name__` of the folder; its last part is the extension's name.
-        needs: names of the extensions it imports; without one of them it is off.
         commands: class of each command of the command line; see `cli.parser.Command`.
         public: object of each name in the package kincheck.
         schemas: type, or function for the JSON Schema, of each kind of file.
@@ -46,6 +44,14 @@ class Extension:
             "native" and "projection"; see `harness.engine.Balancing`.
         simulations: function without arguments for each engine in simulate mode.
         readers: readers of files; see `case.io.readers.Reader`.
+        references: function for the case with a file of `--reference` as its reference, and notes;
+            see `cli.shared_options.with_references`.
+        closings: function for a case without rows that are redundant within a tolerance;
+            see `case.io.case_file`.
+        motions: type of a driver's motion in case files; see `mechanism.motions.Motion`.
+        floors: function for the time of a simulator's compiled code alone, by an engine and a case.
+        lines: function for the keys of a text with their lines, by the suffix of a file; see
+            `case.io.lines`.
         compilers: compiler of plans to machine code; see `program.executor.Compiler`.
         methods: preparation of large mechanisms for paths, by `kinematics.motion_solver.Method`.
         sections: tables of case files with their outputs; see `case.io.sections.CaseSection`.
@@ -55,37 +61,63 @@ class Extension:
         codes: function for the files of a solved case in a language, by their names.
         formats: who reads each format, for the help.
         converters: function from a model's file to the text saved by a simulator.
-        views: HTML of a result or a mechanism in a notebook.
+        views: further forms of a result, and of a mechanism in a notebook; see `tabular`.
         proposals: function for the least moves of places that bring outputs of a case into bands;
             see `live.table`.
         styles: formulation of a mechanism in each row style; see `kinematics.formulation.styles`.
+        suspicions: function for the suspicion of a case's reference, or of native, by the records;
+            see `harness.provenance.Suspicion`.
         steppers: script of each stepper of free motion; see `adapters.steppers.scripts`.
     """
 
-    package: str
-    needs: Sequence[str] = ()
-    commands: _Table = field(default_factory=dict[str, str])
-    public: _Table = field(default_factory=dict[str, str])
-    schemas: _Table = field(default_factory=dict[str, str])
-    keys: _Table = field(default_factory=dict[str, str])
-    completions: _Table = field(default_factory=dict[str, str])
-    engines: _Table = field(default_factory=dict[str, str])
-    equilibria: _Table = field(default_factory=dict[str, str])
-    simulations: _Table = field(default_factory=dict[str, str])
-    readers: _Table = field(default_factory=dict[str, str])
-    compilers: _Table = field(default_factory=dict[str, str])
-    methods: _Table = field(default_factory=dict[str, str])
-    sections: _Table = field(default_factory=dict[str, str])
-    sources: _Table = field(default_factory=dict[str, str])
-    forms: _Table = field(default_factory=dict[str, str])
-    writers: _Table = field(default_factory=dict[str, str])
-    codes: _Table = field(default_factory=dict[str, str])
-    formats: _Table = field(default_factory=dict[str, str])
-    converters: _Table = field(default_factory=dict[str, str])
-    views: _Table = field(default_factory=dict[str, str])
-    proposals: _Table = field(default_factory=dict[str, str])
-    styles: _Table = field(default_factory=dict[str, str])
-    steppers: _Table = field(default_factory=dict[str, str])
+    commands: _Table
+    public: _Table
+    schemas: _Table
+    keys: _Table
+    completions: _Table
+    engines: _Table
+    equilibria: _Table
+    simulations: _Table
+    readers: _Table
+    references: _Table
+    closings: _Table
+    motions: _Table
+    floors: _Table
+    lines: _Table
+    compilers: _Table
+    methods: _Table
+    sections: _Table
+    sources: _Table
+    forms: _Table
+    writers: _Table
+    codes: _Table
+    formats: _Table
+    converters: _Table
+    views: _Table
+    proposals: _Table
+    styles: _Table
+    suspicions: _Table
+    steppers: _Table
+
+
+class Extension:
+    """An extension: its folder, what it needs, and its offers.
+
+    Attributes:
+        package: `__name__` of the folder; its last part is the extension's name.
+        needs: names of the extensions it imports; without one of them it is off.
+        offers: its offers by kind.
+    """
+
+    def __init__(self, package: str, needs: Sequence[str] = (), **offers: Unpack[Doors]) -> None:
+        """Take the parts.
+
+        Raises:
+            TypeError: there is no such kind of offer.
+        """
+        if unknown := offers.keys() - Doors.__annotations__:
+            raise TypeError(f"{package}: extensions offer no {', '.join(sorted(unknown))}")
+        self.package, self.needs, self.offers = package, needs, offers
 
     @property
     def name(self) -> str:
@@ -133,14 +165,14 @@ def extensions() -> Mapping[str, Extension]:
 
 
 def offers(kind: str) -> dict[str, Offer]:
-    """Return what all extensions offer of a kind, a field of `Extension`, by name.
+    """Return what all extensions offer of a kind, a key of `Doors`, by name.
 
     Raises:
         KincheckError: two extensions offer the same name.
     """
     found: dict[str, Offer] = {}
     for extension in extensions().values():
-        for name, where in getattr(extension, kind).items():
+        for name, where in cast("_Table", extension.offers.get(kind, {})).items():
             if name in found:
                 raise KincheckError(
                     f"The extensions {found[name].extension.name} and {extension.name} both offer"

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias, cast
 
-from numpy.typing import NDArray
-
-from .dataset import Dataset, Variable
+from .dataset import Dataset
 from .doors import offers
-from .errors import KincheckError, unknown
-from .extras import library
+from .errors import KincheckError
 
 # These libraries are optional, and a type checker may not find them.
 DataFrame: TypeAlias = Any
@@ -27,6 +22,17 @@ def notebook(view: str, title: str, *what: Any) -> str:
 
     offer = offers("views").get(view)
     return offer.load()(title, *what) if offer else f"<div><b>{escape(title)}</b></div>"
+
+
+def _view(view: str, *what: Any) -> Any:
+    """Return another form of a result.
+
+    Raises:
+        KincheckError: the extension of this form is not there.
+    """
+    if (offer := offers("views").get(view)) is None:
+        raise KincheckError(f"There is no {view} of results: its extension is not installed.")
+    return offer.load()(*what)
 
 
 class Tabular:
@@ -66,24 +72,7 @@ class Tabular:
         if isinstance(self, msgspec.Struct):
             return cast("dict[str, Any]", msgspec.to_builtins(self))
 
-        return self._arrays(lambda values: _plain(values.tolist()))
-
-    def _arrays(self, written: Callable[[NDArray[Any]], Any]) -> dict[str, Any]:
-        """Return the dataset in the form of xarray, with its values as a function writes them."""
-        data = self.dataset()
-
-        def arrays(variables: Mapping[str, Variable]) -> dict[str, Any]:
-            return {
-                name: {
-                    "dims": each.dims,
-                    "attrs": {"units": each.unit} if each.unit else {},
-                    "data": written(each.values),
-                }
-                for name, each in variables.items()
-            }
-
-        coords, variables = arrays(data.coords), arrays(data.variables)
-        return {"dims": data.sizes, "coords": coords, "data_vars": variables}
+        return _view("data", self)
 
     def to_dataframe(self) -> DataFrame:
         """Return a pandas table. The units of its columns are in `attrs["units"]`.
@@ -91,10 +80,7 @@ class Tabular:
         Raises:
             KincheckError: pandas is not installed.
         """
-        data = self.dataset()
-        frame = library("to_dataframe", "pandas", "pandas").DataFrame(data.table())
-        frame.attrs["units"] = {name: each.unit for name, each in data.columns().items()}
-        return frame
+        return _view("frame", self)
 
     def to_xarray(self) -> XarrayDataset:
         """Return an xarray dataset. The unit of a variable is in its `attrs["units"]`.
@@ -102,10 +88,7 @@ class Tabular:
         Raises:
             KincheckError: xarray is not installed.
         """
-        found = library("to_xarray", "xarray", "xarray")
-
-        arrays = self._arrays(lambda values: values)
-        return found.Dataset.from_dict({**arrays, "attrs": {"title": self.summary()}})
+        return _view("arrays", self)
 
     def plot(self, *names: str) -> Figure:
         """Draw the curves with matplotlib, one diagram for each variable, and return the figure.
@@ -118,34 +101,4 @@ class Tabular:
         Raises:
             KincheckError: matplotlib is not installed, or there are no such curves.
         """
-        data = self.drawn()
-        curves = data.curves()
-        for name in names:
-            if name not in curves:
-                raise KincheckError(unknown("curve", name, curves))
-        figures = library("plot", "matplotlib.figure", "matplotlib")
-        shown = names or tuple(data.shown) or tuple(curves)
-        figure = figures.Figure(figsize=(7.0, 2.4 * len(shown)), layout="constrained")
-        axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-        x = data.coords[data.x]
-        for each, name in zip(axes, shown, strict=True):
-            for column, values in curves[name].items():
-                across = values.reshape(len(values), math.prod(values.shape[1:]))
-                lines = each.plot(x.values, across, label=column.removeprefix(f"{name}."))
-                for line in lines[1:]:  # one colour and one entry in the legend for all of a column
-                    line.set(color=lines[0].get_color(), label=None)
-            unit = data.variables[name].unit
-            each.set_ylabel(f"{name} [{unit}]" if unit else name)
-            each.grid(visible=True, alpha=0.3)
-            if len(curves[name]) > 1:
-                each.legend(fontsize="small", ncols=max(1, round(math.sqrt(len(curves[name])))))
-        axes[-1].set_xlabel(f"{data.x} [{x.unit}]" if x.unit else data.x)
-        axes[0].set_title(self.summary())
-        return figure
-
-
-def _plain(values: Any) -> Any:
-    """Return nested lists with null for infinite and missing numbers."""
-    if isinstance(values, list):
-        return [_plain(each) for each in cast("list[Any]", values)]
-    return None if isinstance(values, float) and not math.isfinite(values) else values
+        return _view("figure", self, *names)

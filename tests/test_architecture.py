@@ -148,7 +148,7 @@ core/algebra.py | from .mechanism.motions import JointAngle
 core/primitives/new.py | from ..joints.base import Joint
 core/kinematics/new.py | from ..harness import record
 core/kinematics/new.py | def f():\\n    from .. import harness
-core/kinematics/formulation/new.py | from ..structure.components import Section
+core/kinematics/formulation/new.py | from ..structure.redundancy import without
 core/kinematics/continuation/new.py | from ...extensions import blocks
 core/extensions/free/new.py | from ..board import run
 core/harness/run.py | from ... import adapters

@@ -14,8 +14,19 @@ SIMULATORS = {"mujoco", "pinocchio", "exudyn", "opensim", "pydrake", "dartpy"}
 
 
 NUMERICS = {
-    *("assemblies", "blocks", "code", "designs", "explain", "free", "laboratory", "llvm", "proofs"),
-    *("residuals", "statics"),
+    *(
+        "assemblies",
+        "blocks",
+        "closing",
+        "code",
+        "designs",
+        "explain",
+        "free",
+        "laboratory",
+        "llvm",
+        "proofs",
+    ),
+    *("residuals", "statics", "trace"),
 }
 """Extensions that walk or prove the equations in another way, and see the inside of kinematics."""
 

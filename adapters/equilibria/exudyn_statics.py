@@ -18,8 +18,8 @@ from ...core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
 from ...core.trajectory import Array, Trajectory
 from ..exudyn.exudyn import Exudyn, Loads
 from ..exudyn.rows import System
+from ..shared.exudyn_joints import frame_along
 from ..shared.force_solution import elastic_force, elastic_forces, elastic_torque
-from ..shared.poses import frame_along
 from ..simulate.exudyn_solvers import Coordinates, DriverTable, Solver
 from .walk import Rest, equilibria
 

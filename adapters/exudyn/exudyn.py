@@ -36,7 +36,7 @@ from ...core.trajectory import Array
 from ..shared.constraints import BodyFrame, skew
 from ..shared.exudyn_joints import JOINTS
 from ..shared.force_solution import Element, elastic_force, left_out_of, places, reacting_joints
-from ..shared.projection_engine import Call, CountedCalls, ProjectionEngine
+from ..shared.projection_engine import ProjectionEngine
 from ..shared.projection_model import Dynamics
 from .rows import NO_ROTATION, Rows, System, rotation_about_z
 
@@ -282,36 +282,6 @@ class Exudyn(ProjectionEngine):
     def model_of(self, case: Case) -> ExudynModel:
         """Return Exudyn's system of the case."""
         return ExudynModel(case)
-
-    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
-        """Return the static solver's residual and Jacobian.
-
-        Accelerations need two rates of the rows for a difference.
-        """
-        # the smallest model has one free coordinate
-        least = System()
-        node = least.mbs.AddNode(least.items.Node1D())
-        least.mbs.AddObject(least.items.ObjectMass1D(nodeNumber=node, mass=1.0))
-        least.mbs.Assemble()
-        settings, solver = least.settings(), least.exu.MainSolverStatic()
-        solver.InitializeSolver(least.mbs, settings)
-
-        def calls(solver: Any, mbs: Any, settings: Any) -> Mapping[str, Call]:
-            residual = partial(solver.ComputeAlgebraicEquations, mbs)
-            jacobian = partial(solver.ComputeNewtonJacobian, mbs, settings)
-            return {
-                "ComputeAlgebraicEquations": residual,
-                "ComputeNewtonJacobian": jacobian,
-                "ComputeNewtonJacobian (rates)": jacobian,
-                "ComputeAlgebraicEquations (rates)": residual,
-            }
-
-        return CountedCalls(
-            calls(model.solver, model.mbs, model.settings),
-            calls(solver, least.mbs, settings),
-            {"ComputeAlgebraicEquations": 1, "ComputeNewtonJacobian": 1},
-            {"ComputeNewtonJacobian (rates)": 1, "ComputeAlgebraicEquations (rates)": 2},
-        )
 
 
 def _way(q: Array, v: Array, lengths: Array) -> tuple[Array, Array]:

@@ -24,8 +24,7 @@ from ...core.joints.base import unit
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...core.trajectory import Array
-from ..shared.exudyn_joints import ABOUT_Z, X, objects_of
-from ..shared.poses import frame_along
+from ..shared.exudyn_joints import ABOUT_Z, X, frame_along, objects_of
 from ..shared.tree_forces import mass_properties
 from ..shared.tree_plan import ends_of, middle
 

@@ -23,7 +23,6 @@ import importlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -34,7 +33,6 @@ from ...core.joints import Distance, Spherical
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.force_solution import RowWrench
-from ..shared.projection_engine import Call, CountedCalls
 from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import CHAINS, Chain, Closure, Link, Relation
@@ -70,19 +68,6 @@ class MuJoCo(TreeEngine):
         # without spring and damper, aref equals minus Jdot v to the last bit
         model.m.eq_solref[:] = 0.0
         return model
-
-    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
-        """Return `mj_kinematics` and the other calls of a pose."""
-        mj, nothing = mujoco(), mujoco().MjSpec().compile()
-        poses = ("mj_kinematics", "mj_comPos", "mj_tendon", "mj_makeConstraint")
-        rates = ("mj_comVel", "mj_referenceConstraint")
-
-        def calls(m: Any, d: Any) -> Mapping[str, Call]:
-            return {name: partial(getattr(mj, name), m, d) for name in (*poses, *rates)}
-
-        least = calls(nothing, mj.MjData(nothing))
-        own = calls(model.m, model.d)
-        return CountedCalls(own, least, dict.fromkeys(poses, 1), dict.fromkeys(rates, 1))
 
 
 def mujoco() -> Any:

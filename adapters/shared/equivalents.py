@@ -22,12 +22,11 @@ import numpy as np
 
 from ...core.algebra import triple
 from ...core.case.case import Case, size
-from ...core.joints import AxialJoint, Distance, Joint, Kind, Spherical, Translational, Universal
+from ...core.joints import AxialJoint, Joint, Kind
 from ...core.joints.base import triad, unit
 from ...core.kinematics import unit_near
 from ...core.mechanism.body import ACCELERATION
-from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
-from ...core.mechanism.motions import Driver, JointDisplacement, PointCoordinate
+from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
 
 # Largest difference of a rod's length from the distance at design for a body in its place [m].
@@ -35,57 +34,6 @@ SAME_LENGTH = 1e-12
 # Sine of the smallest angle between a rod and the axis of its body's hinge at which this axis is
 # the first axis of a cross: 17 degrees.
 ALONG = 0.3
-
-
-def with_joints_alone(mechanism: Mechanism, *, rods: bool = False) -> Mechanism:
-    """Return the mechanism with joint drivers only and without rods.
-
-    Rods whose length differs from the design remain. Added bodies have no mass.
-
-    Args:
-        rods: whether all rods remain.
-    """
-    bodies, joints, drivers = list(mechanism.bodies), list[Joint](), list[Driver]()
-    for joint in mechanism.joints:
-        if isinstance(joint, Distance) and fits(joint) and not rods:
-            rod = Body(f"{joint.name}: rod", joint.points[0])
-            bodies.append(rod)
-            joints += _rod(mechanism, joint, rod.name)
-        else:
-            joints.append(joint)
-    for driver in mechanism.drivers:
-        if isinstance(driver, PointCoordinate):
-            point = mechanism.point(driver.point)
-            f, g, h = triad(driver.direction)
-            names = [f"{driver.name}: {way}" for way in ("along", "across", "beyond")]
-            bodies += [Body(name, point.position) for name in names]
-            for below, name, axis in zip((GROUND, *names), names, (h, f, g), strict=False):
-                joints.append(
-                    Translational(name, below, name, point=point.position, axis=triple(axis))
-                )
-            joints.append(
-                Spherical(f"{driver.name}: ball", names[-1], point.body, point=point.position)
-            )
-            drivers.append(JointDisplacement(driver.name, names[0], driver.relative))
-        else:
-            drivers.append(driver)
-    return replace(mechanism, bodies=bodies, joints=joints, drivers=drivers)
-
-
-def fits(rod: Distance) -> bool:
-    """Return whether a rod has its length at design."""
-    return abs(rod.rod_length - rod.design_distance) <= SAME_LENGTH * rod.design_distance
-
-
-def _rod(mechanism: Mechanism, joint: Distance, rod: str) -> list[Joint]:
-    (i, j), (P_i, P_j) = joint.bodies, joint.points
-    if mechanism.is_fixed(j):  # the cross is on the body that turns least
-        (i, j), (P_i, P_j) = (j, i), (P_j, P_i)
-    axes = cross_of(mechanism, i, unit([b - a for a, b in zip(P_i, P_j, strict=True)]))
-    return [
-        Universal(f"{joint.name}: cross", i, rod, point=P_i, axes=axes),
-        Spherical(f"{joint.name}: ball", rod, j, point=P_j),
-    ]
 
 
 def cross_of(mechanism: Mechanism, body: str, along: Iterable[float]) -> tuple[Vector, Vector]:

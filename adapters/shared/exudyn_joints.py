@@ -24,10 +24,9 @@ from typing import Any
 import numpy as np
 
 from ...core import joints as j
-from ...core.joints.base import unit
+from ...core.joints.base import triad, unit
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from .poses import frame_along
 
 # Constrained axes of a generic joint.
 X, Y, Z, ABOUT_X, ABOUT_Y, ABOUT_Z = range(6)
@@ -90,6 +89,11 @@ class JointObject:
     def rows(self) -> Sequence[int]:
         """Indices of the rows that are not empty."""
         return range(ROWS[self.kind]) if self.kind in ROWS else self.axes
+
+
+def frame_along(axis: Sequence[float], column: int) -> Array:
+    """Return a right-handed frame with the unit vector of the axis in a column, shape (3, 3)."""
+    return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
 
 
 def objects_of(joint: j.Joint, points: tuple[Vector, Vector]) -> list[JointObject]:

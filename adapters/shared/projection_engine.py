@@ -11,17 +11,14 @@ around these calls is faster than the floor, in any language.
 from __future__ import annotations
 
 import importlib
-import timeit
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
-import numpy as np
-
 from ...core.case.case import Case
 from ...core.errors import SolveError
-from ...core.harness.engine import Floor, equilibria_of
+from ...core.harness.engine import equilibria_of
 from ...core.joints import Joint
 from ...core.mechanism.mechanism import replaced_joints, with_equivalents
 from ...core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate
@@ -29,34 +26,6 @@ from ...core.trajectory import Trajectory
 from .equivalents import in_own_frame, own_frame
 from .projection import EFFORTS, solve_by_projection
 from .projection_model import ProjectionModel
-
-# Rounds of calls; the fastest round counts, so that interruptions do not matter. A round is long
-# against the clock's resolution.
-ROUNDS = 15
-CALLS = 200
-
-Call = Callable[[], Any]
-
-
-@dataclass(frozen=True)
-class CountedCalls:
-    """The calls of the projection mode into a simulator, by name.
-
-    Attributes:
-        own, least: on the case's model, and on the smallest possible one.
-        poses: how many there are for the residual and Jacobian of a pose.
-        rates: how many more once per sample, for velocities and accelerations.
-    """
-
-    own: Mapping[str, Call]
-    least: Mapping[str, Call]
-    poses: Mapping[str, int]
-    rates: Mapping[str, int]
-
-
-def _microseconds(call: Call) -> float:
-    return 1e6 * min(timeit.repeat(call, number=CALLS, repeat=ROUNDS)) / CALLS
-
 
 DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
 
@@ -172,36 +141,3 @@ class ProjectionEngine(ABC):
     def efforts(self) -> Mapping[str, Self]:
         """Return the efforts by the number of Newton steps."""
         return {label: type(self)(corrections) for label, corrections in EFFORTS.items()}
-
-    @abstractmethod
-    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
-        """Return the calls into the simulator for a sample of the case."""
-
-    def floor(self, case: Case) -> Floor:
-        """Return the time of the simulator's compiled code for a sample, by Newton's method with
-        the iterations of the solved case.
-        """
-        model = self.model_of(self.scaled_case(case))
-        solved = self.solve(model, case, 1e-12)
-        calls = self.simulator_calls(model, case)
-        large, small = (np.eye(n) + 0.1 * np.ones((n, n)) for n in (model.unknowns, 1))
-        lapack: Any = importlib.import_module("scipy.linalg.lapack")
-        linear = f"LU of {model.unknowns} rows"
-        own = {**calls.own, linear: lambda: lapack.dgesv(large, large[0])}
-        least = {**calls.least, linear: lambda: lapack.dgesv(small, small[0])}
-        # the adapter's last step only confirms convergence; the pose before it counts as the pose
-        # for the Jacobian of the rates
-        poses = float(solved.iterations[solved.solved].mean())
-        once = {**calls.poses, linear: 1}
-        counts: dict[str, float] = {name: poses * n for name, n in once.items()}
-        counts |= calls.rates
-        parts = {
-            name: count * max(0.0, _microseconds(own[name]) - _microseconds(least[name]))
-            for name, count in counts.items()
-        }
-        counted = (
-            f"{self.name}: {poses:.3g} poses ({', '.join(once)}) and once"
-            f" {', '.join(calls.rates)}; the fastest of {ROUNDS} rounds, less the same calls on the"
-            " smallest model"
-        )
-        return Floor(sum(parts.values()), counted, parts)

@@ -16,18 +16,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
 from itertools import accumulate, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.joints import Fixed, Joint, Translational
+from ...core.joints import Fixed, Joint
 from ...core.joints.base import unit
 from ...core.mechanism.loads import TorsionSpringDamper
-from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ...core.mechanism.mechanism import GROUND, Vector
 from ...core.mechanism.motions import JointDriver, PointCoordinate
 from ...core.trajectory import Array
 from .constraints import (
@@ -42,7 +40,7 @@ from .constraints import (
     closure_text,
 )
 from .force_solution import RowWrench
-from .projection_engine import Call, CountedCalls, ProjectionEngine
+from .projection_engine import ProjectionEngine
 from .projection_model import Dynamics
 from .tree_forces import Mass, TreeForces
 from .tree_plan import Chain, Closure, Link, Relation, plan_tree
@@ -391,16 +389,6 @@ class TreeModel(ABC):
         return self.forces.dynamics(v, a)
 
 
-# The smallest model: one slide with a driven point, so one frame in a condition.
-LEAST = Mechanism(
-    "slide",
-    [Body("slide")],
-    [Translational("rail", GROUND, "slide", point=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0))],
-    [Point("slide", "slide", (1.0, 0.0, 0.0))],
-    [PointCoordinate("stroke", "slide", (1.0, 0.0, 0.0))],
-)
-
-
 class TreeEngine(ProjectionEngine):
     """An engine whose model is a `TreeModel`."""
 
@@ -418,25 +406,3 @@ class TreeEngine(ProjectionEngine):
     @abstractmethod
     def model_of(self, case: Case) -> TreeModel:
         """Return the simulator's model of the unscaled case, at the design position."""
-
-    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
-        """Return all simulator calls for a pose and its rates."""
-        least = self.model_of(replace(case, mechanism=LEAST, outputs=()))
-        n, wanted = len(model.moving), len(model.wanted)
-        # the same Python on the smallest model
-        least.moving, least.wanted = least.moving * n, least.moving * wanted
-        pose, rates, points = (
-            f"placements and Jacobians of {n} frames",
-            f"accelerations of {n} frames",
-            f"motions of {wanted} points",
-        )
-
-        def calls(of: TreeModel) -> Mapping[str, Call]:
-            zeros = np.zeros(of.unknowns)
-            return {
-                pose: of.observe,
-                rates: partial(of.observe_rates, zeros),
-                points: partial(of.points, zeros, zeros),
-            }
-
-        return CountedCalls(calls(model), calls(least), {pose: 1}, {rates: 1, points: 1})

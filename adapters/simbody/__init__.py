@@ -6,7 +6,8 @@ from ...core.doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["simulate"],
+    needs=["floors", "simulate"],
     engines={"simbody": "simbody:Simbody"},
+    floors={"simbody": "floors:floor"},
     simulations={"simbody": "assembly:Assembly"},
 )

@@ -16,8 +16,14 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.errors import SolveError
 from ...core.trajectory import Array
-from ..shared.equivalents import with_joints_alone
-from ..simulate.simulation import Leg, SimulatedPose, Simulation, SimulationEndedError, start_of
+from ..simulate.simulation import (
+    Leg,
+    SimulatedPose,
+    Simulation,
+    SimulationEndedError,
+    start_of,
+    with_joints_alone,
+)
 from .simbody import Simbody, SimbodyModel, opensim
 
 # Weight of constraints; a driven coordinate has weight 1. With OpenSim's default, an infinite

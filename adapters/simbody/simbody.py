@@ -19,8 +19,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from math import cos, hypot, sin
 from typing import Any, ClassVar
 
@@ -30,13 +29,11 @@ from ...core.case.case import Case
 from ...core.joints import Distance, Inline, Spherical
 from ...core.joints.base import unit
 from ...core.mechanism.mechanism import Vector
-from ...core.mechanism.motions import PointCoordinate
 from ...core.trajectory import Array
+from ..shared.axis_angles import Parameters, euler_angles, orientation
 from ..shared.force_solution import RowWrench
-from ..shared.poses import Parameters, euler_angles, orientation
-from ..shared.projection_engine import Call, CountedCalls
 from ..shared.tree_forces import NO_MASS, Mass, mass_properties
-from ..shared.tree_model import LEAST, TreeEngine, TreeModel
+from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Closure, Link, Relation
 
 UNTURNED: Parameters = (1.0, 0.0, 0.0, 0.0)
@@ -101,41 +98,6 @@ class Simbody(TreeEngine):
     def model_of(self, case: Case) -> SimbodyModel:
         """Return OpenSim's model of the case."""
         return SimbodyModel(opensim(), case)
-
-    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
-        """Return Simbody's stages and its calls for constraints and points."""
-        least = self.model_of(replace(case, mechanism=LEAST, outputs=()))
-        driven = sum(isinstance(each, PointCoordinate) for each in case.mechanism.drivers)
-        points = len(model.wanted)
-        poses = {"realizePosition": 1, "calcG": 1, "calcFrameJacobian": driven}
-        rates = {
-            "realizeVelocity": 2,
-            "calcBiasForAccelerationConstraints": 1,
-            "calcBiasForFrameJacobian": driven,
-            "calcStationJacobian": points,
-            "calcBiasForStationJacobian": points,
-        }
-        return CountedCalls(_calls(model), _calls(least), poses, rates)
-
-
-def _calls(of: SimbodyModel) -> Mapping[str, Call]:
-    """Return the calls of the projection mode into Simbody, by name."""
-    whole, matter, state, J, b = of.model, of.matter, of.state, of.matrix, of.column
-    q, u = (of.o.Vector.createFromMat(np.zeros(n)) for n in (of.slots, of.unknowns))
-    body, point = of.make_frame(1, np.zeros(3))
-    at = body.getMobilizedBodyIndex(), point
-    return {
-        "realizePosition": lambda: (state.setQ(q), whole.realizePosition(state)),
-        "realizeVelocity": lambda: (state.setU(u), whole.realizeVelocity(state)),
-        "calcG": partial(matter.calcG, state, J),
-        "calcBiasForAccelerationConstraints": partial(
-            matter.calcBiasForAccelerationConstraints, state, b
-        ),
-        "calcFrameJacobian": partial(matter.calcFrameJacobian, state, *at, J),
-        "calcBiasForFrameJacobian": partial(matter.calcBiasForFrameJacobian, state, *at),
-        "calcStationJacobian": partial(matter.calcStationJacobian, state, *at, J),
-        "calcBiasForStationJacobian": partial(matter.calcBiasForStationJacobian, state, *at),
-    }
 
 
 def opensim() -> Any:

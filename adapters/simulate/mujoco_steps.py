@@ -21,8 +21,14 @@ from ...core.case.case import Case
 from ...core.mechanism.motions import Ramp
 from ...core.trajectory import Array, Trajectory
 from ..mujoco.mujoco import MuJoCo, MuJoCoModel, mujoco
-from ..shared.equivalents import with_joints_alone
-from .simulation import Leg, SimulatedPose, Simulation, SimulationEndedError, start_of
+from .simulation import (
+    Leg,
+    SimulatedPose,
+    Simulation,
+    SimulationEndedError,
+    start_of,
+    with_joints_alone,
+)
 
 # Inertia of driven coordinates [kg or kg m2] next to bodies with unit inertia: reactions change
 # their motion by a billionth.

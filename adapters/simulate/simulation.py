@@ -24,16 +24,18 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.algebra import triple
 from ...core.case.case import Case
 from ...core.errors import KincheckError, SolveError
-from ...core.joints import Coupler, Distance, Joint
+from ...core.joints import Coupler, Distance, Joint, Spherical, Translational, Universal
+from ...core.joints.base import triad, unit
 from ...core.kinematics import notes_on_start
 from ...core.kinematics import start_of as where_from
-from ...core.mechanism.mechanism import Vector
-from ...core.mechanism.motions import outwards
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
+from ...core.mechanism.motions import Driver, JointDisplacement, PointCoordinate, outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
 from ..shared.constraints import closure_conditions, closure_text
-from ..shared.equivalents import fits, with_joints_alone
+from ..shared.equivalents import SAME_LENGTH, cross_of
 from ..shared.projection import Walk
 from ..shared.projection_engine import ProjectionEngine
 from ..shared.projection_model import ProjectionModel
@@ -267,9 +269,6 @@ class Simulation:
         """Return a message on the joint or driver that is not supported here, or None."""
         return self.projection().unsupported(case)
 
-    def floor(self, case: Case) -> None:
-        """Return None: the bound on steps in Python is that of projection."""
-
     def solve(self, model: Any, case: Case, tol: float) -> Trajectory:
         """Simulate all reachable samples with the simulator's own tolerance (see `settings`),
         however far the constraints drift.
@@ -467,3 +466,54 @@ class SteppedTree(TiedTree):
         self.q = q
         residual = float(np.abs(self.residual(driven[0])).max())
         return SimulatedPose(np.array(self.points(v, a)).swapaxes(0, 1), residual, steps)
+
+
+def with_joints_alone(mechanism: Mechanism, *, rods: bool = False) -> Mechanism:
+    """Return the mechanism with joint drivers only and without rods.
+
+    Rods whose length differs from the design remain. Added bodies have no mass.
+
+    Args:
+        rods: whether all rods remain.
+    """
+    bodies, joints, drivers = list(mechanism.bodies), list[Joint](), list[Driver]()
+    for joint in mechanism.joints:
+        if isinstance(joint, Distance) and fits(joint) and not rods:
+            rod = Body(f"{joint.name}: rod", joint.points[0])
+            bodies.append(rod)
+            joints += _rod(mechanism, joint, rod.name)
+        else:
+            joints.append(joint)
+    for driver in mechanism.drivers:
+        if isinstance(driver, PointCoordinate):
+            point = mechanism.point(driver.point)
+            f, g, h = triad(driver.direction)
+            names = [f"{driver.name}: {way}" for way in ("along", "across", "beyond")]
+            bodies += [Body(name, point.position) for name in names]
+            for below, name, axis in zip((GROUND, *names), names, (h, f, g), strict=False):
+                joints.append(
+                    Translational(name, below, name, point=point.position, axis=triple(axis))
+                )
+            joints.append(
+                Spherical(f"{driver.name}: ball", names[-1], point.body, point=point.position)
+            )
+            drivers.append(JointDisplacement(driver.name, names[0], driver.relative))
+        else:
+            drivers.append(driver)
+    return replace(mechanism, bodies=bodies, joints=joints, drivers=drivers)
+
+
+def fits(rod: Distance) -> bool:
+    """Return whether a rod has its length at design."""
+    return abs(rod.rod_length - rod.design_distance) <= SAME_LENGTH * rod.design_distance
+
+
+def _rod(mechanism: Mechanism, joint: Distance, rod: str) -> list[Joint]:
+    (i, j), (P_i, P_j) = joint.bodies, joint.points
+    if mechanism.is_fixed(j):  # the cross is on the body that turns least
+        (i, j), (P_i, P_j) = (j, i), (P_j, P_i)
+    axes = cross_of(mechanism, i, unit([b - a for a, b in zip(P_i, P_j, strict=True)]))
+    return [
+        Universal(f"{joint.name}: cross", i, rod, point=P_i, axes=axes),
+        Spherical(f"{joint.name}: ball", rod, j, point=P_j),
+    ]

@@ -35,10 +35,10 @@ from ...core.mechanism.loads import (
 )
 from ...core.mechanism.mechanism import GROUND, Mechanism
 from ...core.trajectory import Array, BodyMotion
-from ..shared.exudyn_joints import objects_of
-from ..shared.poses import Displacement, displacements, frame_along, link_coordinates, link_motions
+from ..shared.exudyn_joints import frame_along, objects_of
 from ..shared.tree_plan import CHAINS, Relation, Terms, ends_of, relations
 from . import text
+from .poses import Displacement, displacements, link_coordinates, link_motions
 from .text import require_known
 
 

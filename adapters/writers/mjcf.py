@@ -22,7 +22,10 @@ from ...core.extensions.trees.masses import STAND_INS
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import BodyMotion
-from ..shared.poses import (
+from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, ends_of
+from . import text
+from .hung_tree import Tie, loops, plan, share_masses, ties
+from .poses import (
     attitude,
     direction,
     displacements,
@@ -30,9 +33,6 @@ from ..shared.poses import (
     local,
     rotated,
 )
-from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, ends_of
-from . import text
-from .hung_tree import Tie, loops, plan, share_masses, ties
 from .text import add_note, document, numbers, require_known
 
 NOTE = (

@@ -26,18 +26,10 @@ from ...core.mechanism.body import Body
 from ...core.mechanism.loads import ForceElement, Law, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
-from ..shared.poses import (
-    about,
-    at_start,
-    attitude,
-    bushing_ends,
-    euler_angles,
-    joint_coordinates,
-    local,
-    orientation,
-)
+from ..shared.axis_angles import euler_angles, orientation
 from . import text
 from .hung_tree import Tie, TreeJoint, loops, tree_of
+from .poses import about, at_start, attitude, bushing_ends, joint_coordinates, local
 from .text import add_note, add_text, document, numbers, require_known
 
 NOTE = (

@@ -25,9 +25,9 @@ from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDam
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
 from ..shared.equivalents import cross_of
-from ..shared.poses import at_start, attitude, bushing_ends, joint_coordinates, local
 from . import text
 from .hung_tree import Tie, TreeJoint, extent, loops, tree_of
+from .poses import at_start, attitude, bushing_ends, joint_coordinates, local
 from .text import add_note, add_text, document, numbers, require_known
 
 NOTE = (

@@ -19,8 +19,8 @@ from ...core.mechanism.body import Body, inertia_matrix
 from ...core.mechanism.loads import Bushing, ForceElement, Law, SpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import Array
-from ..shared.poses import direction
 from ..shared.tree_plan import CHAINS
+from .poses import direction
 
 # Simulators require mass and inertia of every moving body. A point mass has an inertia far below
 # that about joints some centimetres away, per mass [m^2].

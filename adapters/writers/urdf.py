@@ -39,9 +39,9 @@ from ..shared.constraints import (
     Length,
     closure_conditions,
 )
-from ..shared.poses import displacements, link_coordinates
 from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, plan_tree, relations
 from . import text
+from .poses import displacements, link_coordinates
 from .text import add_note, document, numbers, require_known
 
 SCHEMA = "kincheck-constraints/1"

@@ -145,18 +145,3 @@ class FileUnits:
 def si_of(unit: Unit) -> str:
     """Return the SI unit of a unit of length, angle or time."""
     return "m" if unit.name in LENGTHS else "rad" if unit.name in ANGLES else "s"
-
-
-def in_units(unit: str, length: Unit, angle: Unit) -> tuple[str, float]:
-    """Return the name of an SI unit, N and s as they are, with other units of length and angle, and
-    the size of one of it [SI]: N m with mm is N mm, a thousandth.
-    """
-    size, powers = 1.0, (1, *[-1] * unit.count("/"))
-    parts = list[str]()
-    for part, power in zip(unit.split("/"), powers, strict=True):
-        names = [{"m": length, "rad": angle}.get(name, name) for name in part.split(" ")]
-        for name in names:
-            if isinstance(name, Unit):
-                size = name.power(size, power)
-        parts.append(" ".join(name.name if isinstance(name, Unit) else name for name in names))
-    return "/".join(parts), size

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from ..case.io.reader_options import Supplied
+from ..doors import offers
 from ..errors import KincheckError
 from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits
 from ..options import (
@@ -188,7 +189,6 @@ def with_references(
         KincheckError: a file cannot be used, or a curve does not belong to one case.
     """
     from ..case.io.reference import PROVED
-    from ..case.io.reference_curve import with_curve
     from ..case.io.reference_file import with_proved_references
 
     curves = [file for file in files if file.suffix.lower() != PROVED]
@@ -200,5 +200,9 @@ def with_references(
         )
     if not curves:
         return with_proved_references(cases, proved, unused), []
-    case, notes = with_curve(cases[0], curves[0], curve)
-    return [case], notes
+    for reader in offers("references").values():
+        case, notes = reader.load()(cases[0], curves[0], curve)
+        return [case], notes
+    raise KincheckError(
+        f"{curves[0]}: found no reader of it, expected a proved reference ({PROVED})."
+    )

@@ -101,21 +101,6 @@ def bounds_error(engine: Engine) -> bool:
     return bool(getattr(engine, "bounds_error", False))
 
 
-@dataclass(frozen=True)
-class Floor:
-    """A lower bound of an engine's time per sample.
-
-    Attributes:
-        us_per_sample: the sum of the parts [us].
-        counted: description of the counted parts and of the method.
-        parts: time of each part [us].
-    """
-
-    us_per_sample: float
-    counted: str
-    parts: Mapping[str, float]
-
-
 @runtime_checkable
 class Balancing(Engine, Protocol):
     """An engine that finds equilibria, of a case with `balance`."""
@@ -147,12 +132,6 @@ class Measurable(Engine, Protocol):
 
     def efforts(self) -> Mapping[str, Engine]:
         """Return the engine at several efforts, coarse to fine, by the setting that differs."""
-        ...
-
-    def floor(self, case: Case) -> Floor | None:
-        """Return the time of the compiled code alone; None for a compiled loop, whose own time is
-        the floor.
-        """
         ...
 
 

@@ -5,24 +5,29 @@ from __future__ import annotations
 import hashlib
 import platform
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeAlias
 
 import msgspec
 import numpy as np
 
 from ..case.case import TIME, Case, Series, Truth
 from ..case.notes import notes
+from ..doors import offers
 from ..mechanism.motions import Absolute, Motion, Slowed
 from ..version import VERSION
 from .compare import as_numbers
-from .record import IDENTICAL, OutputSeries, Record, Results
-from .suspects import suspect
+from .record import IDENTICAL, OutputSeries, Record, Results, Suspect
 from .table_units import table_facts
+
+Suspicion: TypeAlias = Callable[
+    [Case, Sequence[Record], Mapping[str, Series] | None], Suspect | None
+]
+"""Suspicion of a case, by its records and, as far as they are known, native's outputs."""
 
 
 def results(
@@ -50,8 +55,10 @@ def results(
         records,
         [case.name for case in cases if not (case.origin and case.origin.own)],
     )
+    suspicions: list[Suspicion] = [each.load() for each in offers("suspicions").values()]
     suspects = {
         case.name: found
+        for suspect in suspicions
         for case in cases
         if (found := suspect(case, records, (native or {}).get(case.name)))
     }

@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import msgspec
-import numpy as np
 
-from ..algebra import quat, rotation_less_identity, vec
-from ..mechanism.mechanism import GROUND
 from ..tabular import notebook
-from ..trajectory import Array
-
-MOST_FRAMES = 25
-"""Frames of a view in a notebook."""
 
 
 class SceneBody(msgspec.Struct, frozen=True, kw_only=True):
@@ -140,28 +131,5 @@ class Scene(msgspec.Struct, frozen=True, kw_only=True):
     message: str = ""
 
     def view(self, title: str) -> str:
-        """Return the motion for a notebook, in at most `MOST_FRAMES` frames."""
-        bodies = {body.name: body for body in self.bodies}
-        spots: list[tuple[str, Array]] = []
-        rods: list[tuple[Array, Array]] = []
-        count = max(1, len(self.frames))
-        some = np.unique(np.linspace(0, count - 1, min(count, MOST_FRAMES)).round().astype(int))
-
-        def at(name: str, place: Sequence[float]) -> Array:
-            body = bodies.get(name)
-            if body is None or not body.r:
-                return np.tile(place, (len(some), 1))
-            first = quat(body.euler_parameters).conjugate()
-            arm = vec(np.subtract(place, body.origin).tolist())
-            turned = rotation_less_identity(quat(np.array(body.p)[some].T) * first) @ arm + arm
-            return np.array(body.r)[some] + np.stack([*turned], axis=1)
-
-        for joint in self.joints:
-            places = 2 * joint.points if len(joint.points) == 1 else joint.points
-            ends = [at(*each) for each in zip(joint.bodies, places, strict=False)]
-            spots += zip(joint.bodies, ends, strict=False)
-            rods += [(ends[0], ends[1])] if len(joint.points) == 2 else []
-        spots += [(point.body, at(point.body, point.position)) for point in self.points]
-        return notebook(
-            "mechanism", title, spots, rods, {b.name for b in self.bodies if b.fixed} | {GROUND}
-        )
+        """Return the motion for a notebook."""
+        return notebook("scene", title, self)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.case import HELD_BUT, Case, Series, pace, size
-from ..case.closing import held_case
+from ..case.held import held_case
 from ..case.measures import ForceMeasure
 from ..errors import KincheckError
 from ..forces import BALANCED, Forces

@@ -14,7 +14,7 @@ from .fixed import Fixed
 from .gear import Gear
 from .in_plane import InPlane
 from .inline import Inline
-from .linear_coupler import LinearCoupler, linear_relation
+from .linear_coupler import LinearCoupler
 from .orientation_lock import OrientationLock
 from .parallel_axes import ParallelAxes
 from .perpendicular_axes import PerpendicularAxes
@@ -61,5 +61,4 @@ __all__ = [
     "Spline",
     "Translational",
     "Universal",
-    "linear_relation",
 ]

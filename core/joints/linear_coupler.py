@@ -4,16 +4,12 @@ differential. 1 row between all of them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
 from ..errors import MechanismError
 from ..input_checks import plain, require_finite
 from .coupler import Coupler
-from .gear import Gear
-from .polynomial import Polynomial
-from .rack_pinion import RackPinion
 
 
 @dataclass(frozen=True)
@@ -62,22 +58,3 @@ class LinearCoupler(Coupler):
     @property
     def weights(self) -> tuple[float, ...]:
         return self.factors
-
-
-def linear_relation(name: str, weights: Mapping[str, float], freedoms: Sequence[str]) -> Coupler:
-    """Return the plainest coupler that keeps a weighted sum of coordinates at zero.
-
-    Args:
-        weights: by joint, not zero [by m or rad].
-        freedoms: which coordinate of each joint.
-    """
-    if len(weights) > 2:
-        return LinearCoupler(name, (*weights,), (*weights.values(),), freedoms=(*freedoms,))
-    ((first, a), (second, b)), (one, other) = weights.items(), freedoms
-    if one == other == "rotation":
-        return Gear(name, (first, second), -b / a)
-    if one == other:
-        return Polynomial(name, (first, second), (0.0, -b / a), freedoms=(one, other))
-    if one == "rotation":
-        return RackPinion(name, (first, second), -a / b)
-    return RackPinion(name, (second, first), -b / a)

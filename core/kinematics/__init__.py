@@ -6,7 +6,6 @@ Solve:
 
     solve              one design over a sweep
     forces_of          reactions of joints and efforts of drivers of a solved motion
-    trace              a motion by its arc length, beyond lock-ups of a driver
     angle_with_turns   the angle of a joint, followed from the design
     attitude_with_turns
                        the attitude of a body, followed from the design
@@ -17,7 +16,7 @@ Describe:
 
     start_of, solve_from_start, notes_on_start      the start of the samples on a path
     degrees_of_freedom, require_driven              drivers against degrees of freedom
-    reduce_rows, largest_residual                   rows that are redundant but for digits
+    largest_residual                                residual of joints over poses of bodies
     kinds, places, placed                           the geometry by name
     LoadPlace, load_places                          masses and loads by name
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
@@ -42,7 +41,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .compiled.request import LAST_ITERATION, WantedOutput
     from .compiled.routes import Start, notes_on_start, solve_from_start, start_of
-    from .continuation.trace import Curve, Event, trace
     from .followed import (
         DOUBTFUL,
         agreement,
@@ -68,12 +66,11 @@ if TYPE_CHECKING:
     from .native_solver import NativeSolver, ProgramSize
     from .one_design import solve
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
-    from .structure.redundancy import largest_residual, reduce_rows
+    from .structure.redundancy import largest_residual
 
 _NAMES = {
     "compiled.request": "LAST_ITERATION WantedOutput",
     "compiled.routes": "Start notes_on_start solve_from_start start_of",
-    "continuation.trace": "Curve Event trace",
     "followed": (
         "DOUBTFUL agreement angle_with_turns attitude_with_turns follower in_doubt near_design"
     ),
@@ -89,7 +86,7 @@ _NAMES = {
     "motion_solver": "Method Solver",
     "one_design": "solve",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
-    "structure.redundancy": "largest_residual reduce_rows",
+    "structure.redundancy": "largest_residual",
 }
 """Module: its public names. No module of this folder has such a name: once imported, it would take
 the place of the name.

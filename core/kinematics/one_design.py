@@ -18,7 +18,7 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
 from .compiled.request import Request
-from .compiled.routes import Route, recent_route, start_of
+from .compiled.routes import Route, recent_route
 from .continuation.sweep import follow
 from .forces.wanted import wanted_forces
 from .formulation.styles import NATIVE, require_style
@@ -98,16 +98,6 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
         motion = prepare_motion(mechanism, motion_only(mechanism, request), path)
         return by_motion(mechanism, request, path, motion)
     return by_program(mechanism, request, path, lambda each: recent_route(mechanism, each, path))
-
-
-def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:
-    """Return notes on the assumed start of many designs, by the nominal one; none if the design
-    decides it.
-    """
-    start = start_of(mechanism, path)
-    if start.starts_at_design and not start.ambiguous:
-        return []
-    return [*prepare(mechanism, replace(request, varied=()), path)(tol).details.get("notes", ())]
 
 
 def solve(

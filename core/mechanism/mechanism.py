@@ -24,7 +24,7 @@ from ..trajectory import MARKER
 from .body import Body, Vector
 from .loads import Bushing, ForceElement, TorsionSpringDamper
 from .motions import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
-from .rods import end_of, rod_in_rubber
+from .rods import end_of
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
@@ -187,22 +187,7 @@ class Mechanism(ByContent):
 
     def to_html(self, title: str) -> str:
         """Return the design position as HTML, below a title."""
-        placed = [
-            (body, P)
-            for joint in self.joints
-            for body in joint.bodies
-            for P in joint.points_on(body)
-        ]
-        placed += [
-            (point.body, point.position)
-            for point in self.points
-            if not point.name.startswith(MARKER)
-        ]
-        spots = [(body, [P]) for body, P in placed]
-        pairs = [joint.points_on() for joint in self.joints if len(joint.points_on()) == 2]
-        rods = [([a], [b]) for a, b in pairs]
-        fixed = {each.name for each in self.bodies if each.fixed} | {GROUND}
-        return notebook("mechanism", title, spots, rods, fixed)
+        return notebook("mechanism", title, self)
 
     def _check_loads(self) -> None:
         gravity = finite_numbers("gravity", self.gravity, 3, "three numbers [m/s^2]")
@@ -240,53 +225,6 @@ class Mechanism(ByContent):
             return known[name]
         names = [GROUND, *known] if what == "body" else known
         raise MechanismError(f"{who}: {unknown(what, name, names)}", key)
-
-    def released(self) -> Mechanism:
-        """Return the mechanism with the bushings of joints as force elements in their place.
-
-        A rod with bushings, a distance joint, is a body without mass.
-
-        Raises:
-            MechanismError: a coupler or a torsional spring needs such a joint.
-        """
-        soft = {bushing.joint for bushing in self.bushings}
-        needed = {joint: str(each) for each in self.couplers for joint in each.joints}
-        needed |= {
-            each.joint: str(each) for each in self.forces if isinstance(each, TorsionSpringDamper)
-        }
-        for name in soft & set(needed):
-            raise MechanismError(
-                f"{needed[name]} needs joint {name!r}, which gives way to its bushings; put it on"
-                " another joint, or remove the bushings",
-                f"joints.{name}.bushings",
-            )
-        joints = [
-            each
-            for each in (*self.joints, *self.grounded)
-            if self.given_name(each.name) not in soft
-        ]
-        bodies, bushings = [*self.bodies], list[Bushing]()
-        for name in dict.fromkeys(each.joint for each in self.bushings):
-            own = [each for each in self.bushings if each.joint == name]
-            if isinstance(rod := self.joint(name), Distance):
-                body, others, own = rod_in_rubber(rod, own)
-                bodies.append(body)
-                joints += others
-            bushings += (replace(each, joint="") for each in own)
-        return replace(
-            self,
-            bodies=bodies,
-            joints=joints,
-            grounded=(),
-            drivers=[
-                each
-                for each in self.drivers
-                if not isinstance(each, JointDriver) or each.joint not in soft
-            ],
-            reduced=[each for each in self.reduced if each.joint.name not in soft],
-            forces=(*self.forces, *bushings),
-            bushings=(),
-        )
 
     def _leave_out_grounded(self) -> None:
         """Separate the joints between fixed bodies from all others."""

@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..caches import ByContent
+from ..doors import offers
 from ..errors import MechanismError
 from ..input_checks import finite, finite_numbers, held, require_direction
 from ..joints.base import Kind
 from ..trajectory import Array
-from .formula import jet_of
 
+PACKAGE = __name__.removesuffix("mechanism.motions")
 ROUNDED_TIME = 1e-12
 """Relative rounding by which a time may lie outside a motion's span."""
 
@@ -55,6 +56,13 @@ class Motion(ABC):
         if "type" in cls.__dict__:
             Motion.registry[cls.type] = cls
 
+    @staticmethod
+    def types() -> Mapping[str, type[Motion]]:
+        """Return the motions by type, those of extensions too."""
+        for each in offers("motions").values():
+            each.load()
+        return Motion.registry
+
     @property
     def span(self) -> tuple[float, float]:
         """First and last time of the motion [s]."""
@@ -73,7 +81,7 @@ class Ramp(Motion):
     rate: float = measure(Measure.DRIVER_RATE)
 
     def __post_init__(self) -> None:
-        _finite("ramp", rate=self.rate)
+        require_finite("ramp", rate=self.rate)
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         return self.rate * t, np.full_like(t, self.rate), np.zeros_like(t)
@@ -89,7 +97,7 @@ class Sine(Motion):
     phase: float = measure(Measure.ANGLE, default=0.0)
 
     def __post_init__(self) -> None:
-        _finite("sine", amplitude=self.amplitude, frequency=self.frequency, phase=self.phase)
+        require_finite("sine", amplitude=self.amplitude, frequency=self.frequency, phase=self.phase)
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         omega = 2.0 * math.pi * self.frequency
@@ -147,33 +155,6 @@ class Table(Motion):
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         return self._spline(t), self._spline(t, 1), self._spline(t, 2)
-
-
-@dataclass(frozen=True)
-class Formula(Motion):
-    """value = offset + scale * formula, which is over TIME in units of `second`, as Adams has it.
-
-    SIN, COS, SQRT, STEP, POLY and SHF are known; 30D is an angle in degrees.
-    """
-
-    type = "formula"
-    formula: str = measure(Measure.TEXT)
-    scale: float = measure(Measure.DRIVER, default=1.0)
-    offset: float = measure(Measure.DRIVER, default=0.0)
-    second: float = measure(Measure.TIME, default=1.0)
-
-    def __post_init__(self) -> None:
-        _finite("formula", scale=self.scale, offset=self.offset, second=self.second)
-        if not self.second > 0.0:
-            raise MechanismError(f"formula motion: second is {self.second!r}; give a positive time")
-        try:
-            jet_of(self.formula, np.zeros(1))
-        except MechanismError as error:
-            raise MechanismError(f"formula motion: {error}; in {self.formula!r}") from None
-
-    def at(self, t: Array) -> tuple[Array, Array, Array]:
-        found, rate = jet_of(self.formula, t / self.second), self.scale / self.second
-        return self.offset + self.scale * found.x, rate * found.v, rate / self.second * found.a
 
 
 @dataclass(frozen=True)
@@ -245,7 +226,7 @@ class Path(ByContent):
 
     @cached_property
     def is_builtin(self) -> bool:
-        """Whether all motions are of this module with immutable numbers: equal ones then mean the
+        """Whether all motions are of this package with immutable numbers: equal ones then mean the
         same.
         """
         motions = (
@@ -255,7 +236,7 @@ class Path(ByContent):
             hash(self)
         except TypeError:  # a number given as an array
             return False
-        return all(type(each).__module__ == __name__ for each in motions)
+        return all(type(each).__module__.startswith(PACKAGE) for each in motions)
 
     def where(self, t: float) -> str:
         """Return the values of the moving drivers at time t, as text."""
@@ -329,7 +310,8 @@ def outwards(times: Array, start: float) -> tuple[NDArray[np.intp], NDArray[np.i
     return nearest[after], nearest[~after]
 
 
-def _finite(who: str, **numbers: Any) -> None:
+def require_finite(who: str, **numbers: Any) -> None:
+    """Refuse numbers of a motion that are not finite."""
     for name, value in numbers.items():
         if not finite(value):
             raise MechanismError(f"{who} motion: {name} is {value!r}; give a finite number")

@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
 
-from ..algebra import vec
 from ..errors import MechanismError, Phrase
-from ..joints import Distance, Joint, PerpendicularAxes, Spherical
-from ..joints.base import triad
+from ..joints import Distance
 from ..joints.distance import NOTED
-from .body import Body
 from .loads import Bushing
 
 # A bushing's point and an end of its rod are one, as the digits of files have it, if they are not
 # further apart than this part of the rod's length.
 SAME_PLACE = 1e-5
-# An axis of a bushing is across the rod if less than this part of it is along: round-off.
-ACROSS = 1e-12
 
 
 def end_of(rod: Distance, bushing: Bushing) -> int:
@@ -52,39 +45,3 @@ def end_of(rod: Distance, bushing: Bushing) -> int:
             f"{who}.bushings.{key}.point",
         )
     return apart.index(min(apart))
-
-
-def rod_in_rubber(
-    rod: Distance, bushings: Sequence[Bushing]
-) -> tuple[Body, list[Joint], list[Bushing]]:
-    """Return a rod as a body without mass, its joints and its bushings.
-
-    An end without a bushing is a ball joint. If no bushing resists turns about the rod, a row keeps
-    it from turning, which carries no torque. Bushings along all axes alike that resist no turn are
-    then exactly a spring between the ends, as stiff as both in series.
-
-    Raises:
-        MechanismError: a bushing does not fit the rod.
-    """
-    body = Body(f"rod {rod.name}", rod.points[0])
-    ends = [end_of(rod, each) for each in bushings]
-    soft = list[Bushing]()
-    for k, each in zip(ends, bushings, strict=True):
-        far = (rod.j, rod.i)[k]
-        i, j = (body.name if name == far else name for name in each.bodies)
-        soft.append(replace(each, i=i, j=j))
-    neighbors = (rod.i, body.name), (body.name, rod.j)
-    joints: list[Joint] = [
-        Spherical(f"{rod.name} ball", *neighbors[k], rod.points[k]) for k in (0, 1) if k not in ends
-    ]
-    along = vec(rod.points[1]) - vec(rod.points[0])
-    least = ACROSS * rod.design_distance
-    if not any(
-        k > 0.0 and abs(vec(axis) @ along) > least
-        for each in soft
-        for k, axis in zip(each.turning_stiffness, each.triad, strict=True)
-    ):
-        first, second, _ = triad([*along])
-        axes = (first.x, first.y, first.z), (second.x, second.y, second.z)
-        joints.append(PerpendicularAxes(f"{rod.name} spin", rod.i, body.name, axes))
-    return body, joints, soft

@@ -384,7 +384,7 @@ def changes(
         inputs: operations of any kind; their operands are not looked at.
     """
     gradients = {each.number: gradient for each, gradient in inputs.items()}
-    for number in _live(tape, values, gradients):
+    for number in live(tape, values, gradients):
         op, *_ = node = tape.nodes[number]
         read = operands(node)
         if number in gradients or not any(gradients.get(k) for k in read):
@@ -401,7 +401,7 @@ def changes(
     ]
 
 
-def _live(tape: Tape, values: Sequence[Scalar], given: Collection[int] = ()) -> list[int]:
+def live(tape: Tape, values: Sequence[Scalar], given: Collection[int] = ()) -> list[int]:
     """Return the numbers of the operations needed for values, in order; none behind given ones."""
     waiting = [each.number for each in values if isinstance(each, Traced)]
     found = set[int]()
@@ -427,25 +427,6 @@ def _sum(terms: Iterable[tuple[Scalar, Gradient]]) -> Gradient:
         for k, value in gradient.items():
             total[k] = total.get(k, 0.0) + weight * value
     return {k: value for k, value in total.items() if isinstance(value, Traced) or value != 0.0}
-
-
-def folded(tape: Tape, values: Sequence[Scalar], known: Mapping[int, Scalar]) -> list[Scalar]:
-    """Return scalars with numbers in place of some inputs, by slot, or with scalars of one other
-    kind in place of all: all operations fold again.
-    """
-    new: dict[int, Scalar] = {}
-    for number in _live(tape, values):
-        op, *rest = tape.nodes[number]
-        if op == "input":
-            new[number] = known.get(int(rest[0]), tape.scalars[number])
-        elif op == "const":
-            new[number] = float(rest[0])
-        elif op == "where":
-            _, *sizes = tape.nodes[int(rest[0])]
-            new[number] = where_larger(*(new[int(k)] for k in (*sizes, *rest[1:])))
-        elif op != "larger":  # which "where" reads itself
-            new[number] = OPERATIONS[str(op)](*(new[int(k)] for k in rest))
-    return [new[each.number] if isinstance(each, Traced) else each for each in values]
 
 
 def _over(a: Scalar, b: Scalar) -> Scalar:

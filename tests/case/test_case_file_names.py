@@ -3,9 +3,9 @@
 import re
 
 import pytest
-from kincheck.core.case.io.mechanism_sections import with_bushings
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
+from kincheck.core.extensions.hardpoints.rubber import with_bushings
 
 from ..support.case_texts import BASE, INLINE, write
 

@@ -46,7 +46,7 @@ ROWS = {
 
 
 def types():
-    return Joint.registry | Coupler.registry | DRIVERS | Motion.registry
+    return Joint.registry | Coupler.registry | DRIVERS | Motion.types()
 
 
 def lines():
@@ -212,7 +212,7 @@ def test_schema_defines_every_type():
     assert set(Joint.registry) <= {
         name.removeprefix("joints.") for name in defined if name.startswith("joints.")
     }
-    assert {f"motion.{name}" for name in Motion.registry} <= set(defined)
+    assert {f"motion.{name}" for name in Motion.types()} <= set(defined)
     assert defined["joints.revolute"]["properties"]["type"] == {"const": "revolute"}
     assert defined["bodies"]["properties"]["fixed"]["description"] == "true or false"
 

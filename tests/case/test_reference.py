@@ -4,7 +4,6 @@ matched, interpolated, rounded, shorter, and judged.
 
 import hashlib
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,7 +23,6 @@ from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import Curve, deviation
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
-from kincheck.core.harness.suspects import slips
 from scipy.interpolate import CubicSpline
 
 from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write
@@ -335,15 +333,6 @@ def test_rounded_reference_on_grid(tmp_path):
     assert off.errors["x"].position.worst_step == 0
 
 
-def test_slip_of_rounded_reference_is_named(tmp_path):
-    """Metres in a file of millimetres, with six digits: times 1000 it fits within a sixth digit."""
-    rows = np.array(curve(GRID)) * [1.0, 1e-3, 1.0]
-    case = crank_case(tmp_path, rows, atol="1e-9", form="{:.6g}")
-    results = run([case], [Native()], tol=1e-12)
-    assert results.records[0].outcome is Outcome.FAIL
-    assert "times 1000" in results.suspects["crank"].message
-
-
 WRONG = {
     "few rows": (
         curve(OWN[:3]),
@@ -569,12 +558,3 @@ def test_deviation_counts_in_tolerances():
     ):
         off = deviation(Curve(np.array(values), atol), known)
         assert (off.worst_step, off.max_abs, off.tolerance, off.within) == worst
-
-
-def test_slip_scales_accuracy():
-    values = np.linspace(1.0, 2.0, 9)
-    held = Curve(values, 1e-9)
-    reference = Curve(values / 1000.0 + 4e-7, half=np.full(9, 5e-7))
-    ((change, off),) = slips(held, reference, {}, offsets=False).items()
-    assert (change, off.tolerance) == ("times 1000", pytest.approx(5e-4, rel=1e-5))
-    assert slips(held, replace(reference, half=None), {}, offsets=False) == {}

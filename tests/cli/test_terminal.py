@@ -12,7 +12,7 @@ from kincheck.core.cli.joint_loading import named_joint
 from kincheck.core.cli.main import main
 from kincheck.core.harness.provenance import truth_of
 from kincheck.core.options import whole
-from kincheck.core.report.terminal import Meter, columns, console
+from kincheck.core.report.terminal import columns, console
 
 from ..support.fakes import Fake
 
@@ -104,23 +104,6 @@ def test_narrow_run_table_groups_by_case(kincheck_main, capsys, monkeypatch, wid
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= width
     assert sum("crank" in line for line in lines) == (2 if width == 200 else 1)
-
-
-def test_progress_states_remaining_time(capsys, monkeypatch):
-    now = iter([0.0, 0.0, 90.0, 100.0])
-    monkeypatch.setattr("kincheck.core.report.terminal.perf_counter", lambda: next(now))
-    with Meter("stress", every=5.0) as meter:
-        meter("arms", 0.0)
-        meter("folds", 0.25)
-        meter("hidden", 0.3)
-    found = ["stress: arms (0 %)", "stress: folds (25 %, about 4 min 30 s left)"]
-    assert capsys.readouterr().err.splitlines()[:2] == found
-
-
-def test_quiet_progress_is_silent(capsys):
-    with Meter("stress", quiet=True) as meter:
-        meter("arms", 0.5)
-    assert capsys.readouterr() == ("", "")
 
 
 def test_case_summary_matches_loaded_case():

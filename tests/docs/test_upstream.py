@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from kincheck.core.extras import python_of
+from kincheck.core.extensions.environments.environments import python_of
 
 from ..support.sources import ROOT
 

@@ -27,7 +27,7 @@ TYPES = [
     *Joint.registry,
     *Coupler.registry,
     *DRIVERS,
-    *Motion.registry,
+    *Motion.types(),
     *Measure.registry,
     *SuspensionOutput.registry,
 ]

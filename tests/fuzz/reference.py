@@ -11,7 +11,7 @@ from pathlib import Path
 import kincheck.cases
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
+from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 
 from ..support.case_texts import BASE
 from .fuzzing import changing, read_or_refused, written

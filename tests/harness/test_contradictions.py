@@ -7,7 +7,7 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.adapters import engine
 from kincheck.core.case.case import Series
-from kincheck.core.case.closing import held_case
+from kincheck.core.case.held import held_case
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.harness.execution import Answer, Attempt, Failure, Pair, attempt

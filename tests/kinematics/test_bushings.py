@@ -145,13 +145,6 @@ def test_bushing_case_file_round_trip(tmp_path):
     assert case.mechanism.force("b").curve[1] == TABLE
 
 
-def test_released_joint_keeps_its_bushings(tmp_path):
-    soft = bushed(tmp_path, "cardan").mechanism.released()
-    assert [joint.name for joint in soft.joints] == ["g"]
-    assert [each.name for each in soft.forces] == ["b", "s", "h.front"]
-    assert [each.name for each in soft.drivers] == ["e"]
-
-
 @pytest.mark.parametrize(
     ("given", "expected"),
     [

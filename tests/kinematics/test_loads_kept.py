@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.adapters.shared.equivalents import in_own_frame, own_frame, with_joints_alone
+from kincheck.adapters.shared.equivalents import in_own_frame, own_frame
+from kincheck.adapters.simulate.simulation import with_joints_alone
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.extensions.laboratory.stress.reduction import reduce_case, round_geometry
-from kincheck.core.kinematics.formulation.constraints import frames, structure
 from kincheck.core.kinematics.formulation.parameters import placed, places
-from kincheck.core.kinematics.structure.components import components, describe_components
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.mechanism import Mechanism
 
@@ -50,24 +49,6 @@ def test_equivalent_joint_bodies_are_massless():
     added = {each.name: each.mass for each in with_joints_alone(pushed()).bodies}
     assert len(added) == 3 + 4  # of a rod, and three slides
     assert sum(added.values()) == 5.5
-
-
-def test_component_programs_ignore_masses():
-    """Two loops alike but for their masses are one program."""
-    light = loaded()
-    heavy = replace(light, bodies=[replace(each, mass=7.0) for each in light.bodies], forces=())
-
-    def programs(mechanism):
-        """The structure of each component, with its numbers."""
-        parts = components(mechanism, frames(mechanism))
-        every = [each.name for each in mechanism.points], [each.name for each in mechanism.moving]
-        numbers: list[list[float]] = [[] for _ in parts]
-        found = describe_components(mechanism, parts, *every)
-        return [
-            (structure(each.section, own), own) for each, own in zip(found, numbers, strict=True)
-        ]
-
-    assert programs(heavy) == programs(light)
 
 
 def test_loads_scale_with_length_unit():

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
+from ...doors import offers
 from ...errors import CaseError, MechanismError, unknown
 from ..case import Case, Truth
 from ..quantity import with_markers
@@ -110,9 +111,9 @@ def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case
             raise MechanismError(unknown("joint", name, known), "closure.carrying")
     if closure is None:
         return case
-    from ..closing import within_digits  # it imports the solver, and few cases need it
-
-    return within_digits(case, closure, why, keys.carrying)
+    for each in offers("closings").values():
+        return each.load()(case, closure, why, keys.carrying)
+    raise MechanismError(f"{why}: no extension leaves rows out; give all digits", "closure")
 
 
 def _with_outputs(root: Section, case: Case) -> Case:

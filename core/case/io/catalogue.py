@@ -74,7 +74,7 @@ def type_tables() -> dict[str, Rows]:
             lambda cls: (_keys(cls), "1 row", f"couples {' and '.join(cls.freedoms)}"),
         ),
         "drivers: type, and": _rows(DRIVERS),
-        "motions of drivers: type, and": _rows(Motion.registry),
+        "motions of drivers: type, and": _rows(Motion.types()),
         "force elements: type, and": _rows(
             ELEMENTS,
             lambda cls: (
@@ -198,7 +198,7 @@ def case_schema() -> dict[str, Any]:
         **{each.key: each.keys for each in sections() if each.types},
         "reference": ReferenceKeys,
     }
-    motions = _structs(Motion.registry)
+    motions = _structs(Motion.types())
     found = document_schema(SCHEMA, case_keys(), tables, single, {"motion": motions})
     for name in DRIVERS:
         keys = found["$defs"][f"drivers.{name}"]["properties"]

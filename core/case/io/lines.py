@@ -1,4 +1,4 @@
-"""Places in texts of TOML, JSON and YAML: the path of a key, and the line it stands in."""
+"""Places in texts of TOML and JSON: the path of a key, and the line it stands in."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+
+from ...doors import offers
 
 # A message is made in a second.
-LONGEST, LONGEST_YAML = 4_000_000, 500_000
+LONGEST = 4_000_000
 # Tables of a case are three levels deep, rows of numbers two more. Deeper nesting only obscures a
 # message.
 DEEPEST = 16
@@ -34,16 +35,12 @@ def place(file: Path, key: str) -> str:
 
     The line is that of the closest table around it, if the file has no such key.
     """
-    kinds = {
-        ".toml": keys_of,
-        ".json": _keys_of_json,
-        ".yaml": _keys_of_yaml,
-        ".yml": _keys_of_yaml,
-    }
+    kinds = {".toml": keys_of, ".json": _keys_of_json}
+    kinds |= {suffix: each.load() for suffix, each in offers("lines").items()}
     read, line = kinds.get(file.suffix.lower()), 0
     if read and key:
         with suppress(OSError, ValueError):
-            if file.stat().st_size <= (LONGEST_YAML if read is _keys_of_yaml else LONGEST):
+            if file.stat().st_size <= LONGEST:
                 line = line_of(key, read(file.read_text("utf-8-sig")))
     return f"line {line}: {key}" if line else key
 
@@ -126,25 +123,3 @@ def _name(token: str) -> str:
 
 def _keys_of_json(text: str) -> Iterator[tuple[str, int]]:
     return keys_of(text, "")
-
-
-def _keys_of_yaml(text: str) -> Iterator[tuple[str, int]]:
-    """Yield the path of each key and item of a YAML text, with its line; nothing without PyYAML."""
-    try:
-        import yaml
-    except ImportError:
-        return
-    untyped: Any = yaml
-    with suppress(RecursionError, yaml.YAMLError):
-        yield from _keys_below("", untyped.compose(text, yaml.BaseLoader))
-
-
-def _keys_below(path: str, node: Any) -> Iterator[tuple[str, int]]:
-    found: list[tuple[str, Any, Any]] = []
-    if node and node.id == "mapping":
-        found = [(join(path, str(key.value)), key, value) for key, value in node.value]
-    elif node and node.id == "sequence":
-        found = [(f"{path}[{k}]", value, value) for k, value in enumerate(node.value)]
-    for below, key, value in found:
-        yield below, key.start_mark.line + 1
-        yield from _keys_below(below, value)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,7 @@ from ...mechanism.motions import (
 from ...trajectory import Array
 from ..case import MARKER, SLOW, TIME, Case, Sweep
 from ..units import RADIAN, SECOND, FileUnits, Unit, plain
-from .document import Section, explained, parse, read_text, shown
+from .document import Section, explained, shown
 from .reference import read_grid
 from .schema import (
     MOST_SAMPLES,
@@ -327,7 +326,7 @@ def _require_moved(
 
 
 def _motion(mechanism: Mechanism, name: str, section: Section) -> Motion:
-    cls = section.class_of("motion", Motion.registry)
+    cls = section.class_of("motion", Motion.types())
     driver = _unit(mechanism.driver(name), section.units)
     motion = _build(section, cls, driver=driver)
     design = mechanism.design_value(name)
@@ -446,51 +445,3 @@ def sweep_lines(case: Case, values: Array, *, own_grid: bool) -> list[str]:
             " give an even one"
         )
     return toml_table({"driver": sweep.driver, **grid, **rate}, "sweep")
-
-
-def bushings_in(file: Path, *tables: str) -> Section:
-    """Return the tables of a file of bushings.
-
-    Args:
-        tables: names of its tables.
-
-    Raises:
-        CaseError: the file cannot be read, or has other tables or keys.
-    """
-    text = read_text(file, LARGEST, "it holds the bushings of one suspension")
-    try:
-        root = Section(file, "", parse(file, text))
-        root.require_keys(tables)
-        for _, joint in root.at("joints").each():
-            joint.require_keys(("bushings",))
-        return root
-    except CaseError as error:
-        raise CaseError(
-            f"{error}; --bushings takes TOML, [bushings.ROLE] as kincheck templates NAME --bushings"
-            " prints, or [joints.NAME.bushings.X]"
-        ) from None
-
-
-def with_bushings(case: Case, file: Path, *tables: str) -> Case:
-    """Return a case with the bushings in a file of tables [joints.NAME.bushings.X], in SI units,
-    beside its own: tables of hardpoints have none.
-
-    Args:
-        tables: names of other tables of the file.
-
-    Raises:
-        CaseError: the file cannot be read, or names an unknown joint.
-    """
-    root, joints = bushings_in(file, "joints", *tables), case.mechanism.given_joints
-    names = [joint.name for joint in joints]
-    for name, section in root.at("joints").each():
-        section.require(name, names, "a joint")
-    found = read_bushings(root, joints)
-    if not found:
-        raise root.at("joints").fault(
-            "found no bushing, expected tables [joints.NAME.bushings.X], or, for a table of"
-            " hardpoints, [bushings.ROLE]; add one"
-        )
-    bushings = (*case.mechanism.bushings, *found)
-    with root.at("joints").explained():
-        return replace(case, mechanism=replace(case.mechanism, bushings=bushings))

@@ -16,15 +16,13 @@ from ...mechanism.loads import Bushing, ForceElement, Torque, TorsionSpringDampe
 from ...mechanism.mechanism import Mechanism, Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, pace, size
 from ..measures import (
-    Component,
     ForceMeasure,
     JointAngle,
     JointDisplacement,
     Measure,
-    Orientation,
     key_of,
 )
-from ..quantity import AXES, Derived, TypedQuantity, own_keys, with_markers
+from ..quantity import AXES, Derived, TypedQuantity, own_keys
 from ..units import Convert
 from .document import Section, explained
 from .reference_samples import RATES
@@ -123,35 +121,6 @@ def with_all_coordinates(case: Case, points: Iterable[str] | None = None) -> Cas
         for axis, along in AXES.items()
     ]
     return replace(case, outputs=tuple(outputs))
-
-
-def with_all_motions(case: Case, at_design: Mapping[str, float] | None = None) -> Case:
-    """Return the case with the motion of every part as outputs, with default tolerances.
-
-    The outputs are the coordinates of all points, the angle or displacement of every joint with
-    such a freedom, and the Euler parameters of every moving body.
-
-    Args:
-        at_design: coordinates of a model's joints where they are not zero; their outputs are named
-            JOINT.qpos [m or rad].
-    """
-    mechanism, extent = case.mechanism, size(case)
-    outputs: list[Quantity] = [*with_all_coordinates(case).outputs]
-    for joint in mechanism.joints:
-        for what, cls in (("angle", JointAngle), ("displacement", JointDisplacement)):
-            if cls.freedom in joint.freedoms:
-                given = default(extent, cls.measure)
-                outputs.append(cls(f"{joint.name}.{what}", *given, joint=joint.name))
-                if value := (at_design or {}).get(joint.name):
-                    name = f"{joint.name}.qpos"
-                    outputs.append(cls(name, *given, joint=joint.name, at_design=value))
-    outputs += [
-        Orientation(f"{body.name}.{each}", *default(extent, "1"), body=body.name, component=each)
-        for body in mechanism.moving
-        for each in Component
-        if each.startswith("e")
-    ]
-    return replace(case, mechanism=with_markers(mechanism, outputs), outputs=tuple(outputs))
 
 
 def read_output(name: str, section: Section, tables: Mapping[str, Any], case: Case) -> Quantity:

@@ -2,4 +2,8 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, needs=["explain", "trees"], readers={"dataset": "reader:DATASET"})
+EXTENSION = Extension(
+    __name__,
+    needs=["closing", "explain", "formulas", "trees", "xml"],
+    readers={"dataset": "reader:DATASET"},
+)

@@ -37,10 +37,10 @@ from ...joints import (
     Spherical,
     Translational,
     Universal,
-    linear_relation,
 )
 from ...joints.base import AxialJoint
 from ...trajectory import Array
+from ..trees.linear_relation import linear_relation
 from .dataset import Dataset, Statement
 from .functions import linear
 from .model import Coordinate, Frame, Marker, Model, Places, coordinates, rotations

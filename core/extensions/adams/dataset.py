@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import cast
 
 from ...case.io.document import fault, shown, unknown_name, usable
-from ...case.io.ledger import Asked
 from ...errors import CaseError, remedy
-from ...mechanism.formula import number
+from ..formulas.formula import number
+from ..xml.ledger import Asked
 
 ARGUMENTS: Mapping[str, str] = {
     "UNITS": "SYSTEM LENGTH MASS FORCE TIME UCF",

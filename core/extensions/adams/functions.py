@@ -15,13 +15,11 @@ from ...case.case import TIME, Sweep
 from ...case.io.document import decimal, fault, shown, unknown_name
 from ...case.io.schema import MOST_SAMPLES
 from ...errors import CaseError, MechanismError, shortened
-from ...mechanism.formula import CURVES, evaluate, polynomial
 from ...mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism, Point
 from ...mechanism.motions import (
     Absolute,
     Driver,
-    Formula,
     JointAngle,
     JointDisplacement,
     Motion,
@@ -29,6 +27,8 @@ from ...mechanism.motions import (
     Table,
 )
 from ..explain.rank import Ranks
+from ..formulas.formula import CURVES, evaluate, polynomial
+from ..formulas.motion import Formula
 from ..trees.options import DrivingOptions
 from .dataset import Statement
 from .model import Coordinate, Model, coordinates

@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...case.case import Case, Truth
-from ...case.closing import within_digits
 from ...case.io.document import explained, fault
-from ...case.io.outputs import with_all_motions
 from ...case.io.readers import LEFT_OUT, WITHOUT
 from ...errors import shortened
 from ...kinematics import degrees_of_freedom
 from ...mechanism.body import Body
 from ...mechanism.mechanism import Mechanism, Point, Vector
+from ..closing.digits import within_digits
 from ..trees.options import DrivingOptions
+from ..trees.outputs import with_all_motions
 from .constraints import (
     ADDED_UP,
     CLOSED,

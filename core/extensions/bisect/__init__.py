@@ -4,7 +4,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["exports"],
+    needs=["environments", "exports", "reports"],
     commands={"bisect": "command:Bisect"},
     schemas={"bisect": "results:Bisection"},
 )

@@ -69,8 +69,8 @@ class Bisect(Command):
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ...harness.engine import STANDARD
-        from ...report.sections import deliver
         from ...version import VERSION
+        from ..reports.reports import deliver
         from . import releases
         from .inside import Task
         from .page import report

@@ -24,7 +24,8 @@ from typing import Any, cast
 
 from ...doors import entry_points
 from ...errors import KincheckError
-from ...extras import ENVIRONMENTS, THREADS, distribution_of
+from ...extras import THREADS, distribution_of
+from ..environments.environments import ENVIRONMENTS
 
 PATIENCE = 900.0
 """Longest installation of a release [s]; the largest wheel has 200 MB."""

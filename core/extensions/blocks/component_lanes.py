@@ -31,9 +31,8 @@ from ...kinematics.compiled.request import (
 from ...kinematics.compiled.solution import Columns
 from ...kinematics.continuation.singular_poses import SOUND, Anchor, Numbers
 from ...kinematics.formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
-from ...kinematics.formulation.constraints import frames, structure
+from ...kinematics.formulation.constraints import frames
 from ...kinematics.formulation.state_vectors import samples
-from ...kinematics.structure.components import Alike, components, describe_components
 from ...kinematics.structure.degrees_of_freedom import freedom_account
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
@@ -41,6 +40,8 @@ from ...program import Parts
 from ...trajectory import QUANTITIES, Array
 from ..llvm.executor import LlvmParts, LlvmWalk
 from ..llvm.plan import aligned
+from .components import Alike, components, describe_components
+from .numbers_of import structure
 from .sparse_lanes import SparseLanes
 from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 

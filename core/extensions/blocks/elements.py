@@ -22,14 +22,7 @@ from ...kinematics.compiled.compiled_model import is_builtin
 from ...kinematics.compiled.dense_equations import GEOMETRY, System
 from ...kinematics.compiled.request import RATE, Layout
 from ...kinematics.formulation.cartesian import COLUMNS, Cartesian
-from ...kinematics.formulation.constraints import (
-    Constraint,
-    Relation,
-    coordinates_of,
-    renamed,
-    structure,
-    with_numbers,
-)
+from ...kinematics.formulation.constraints import Constraint, Relation
 from ...kinematics.formulation.styles import NATIVE
 from ...program import Plan, Program, Tape, Traced, program
 from ...program.executor import Bind
@@ -37,6 +30,7 @@ from ..llvm.bytecode import Bytecode, bytecode, repeated
 from ..llvm.compiler import vector_width
 from ..llvm.executor import LlvmExecutor
 from ..llvm.jit import LlvmCode
+from .numbers_of import coordinates_of, renamed, structure, with_numbers
 
 Indices = NDArray[np.intp]
 ROWS, GAMMA, RETRACT = "rows", "gamma", "retract"

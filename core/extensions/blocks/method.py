@@ -22,11 +22,11 @@ from ...kinematics.compiled.compiled_model import is_known
 from ...kinematics.compiled.request import Request
 from ...kinematics.formulation.constraints import frames
 from ...kinematics.motion_solver import Solver
-from ...kinematics.structure.components import components
 from ...kinematics.structure.degrees_of_freedom import require_driven
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from .component_lanes import ComponentLanes
+from .components import components
 from .sparse_lanes import SparseLanes
 from .sweep import BlockSweep
 

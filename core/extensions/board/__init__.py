@@ -4,7 +4,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["free"],
+    needs=["environments", "free", "reports"],
     commands={"board": "command:CompareSteppers"},
     schemas={"board": "results:Board"},
 )

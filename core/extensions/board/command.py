@@ -13,9 +13,9 @@ from ...cli.parser import Command
 from ...cli.registry import Registry, Status
 from ...doors import offers
 from ...errors import KincheckError, refuse
-from ...extras import ENVIRONMENTS
 from ...harness.resource_limits import TIMEOUT
 from ...options import destination, option, options, positive, whole
+from ..environments.environments import ENVIRONMENTS
 
 if TYPE_CHECKING:
     from .truth import Truth
@@ -70,8 +70,9 @@ class CompareSteppers(Command):
 
         from ...case.io.atomic_files import write_all
         from ...harness.record import to_json
-        from ...report.sections import page, print_report
+        from ...report.sections import page
         from ..free.section import free_in
+        from ..reports.reports import print_report
         from . import run
         from .page import report
         from .results import Board, earlier_rows

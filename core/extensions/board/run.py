@@ -18,8 +18,9 @@ import numpy as np
 from ...case.io.escape import file_name
 from ...doors import offers
 from ...errors import KincheckError, UnsupportedError, unknown
-from ...extras import THREADS, how_to_add, how_to_install, python_of
+from ...extras import THREADS, how_to_install
 from ...harness.record import to_json
+from ..environments.environments import how_to_add, python_of
 from ..free.section import free_in
 from .results import Row, Run, State
 from .truth import Truth

@@ -3,5 +3,8 @@
 from ...doors import Extension
 
 EXTENSION = Extension(
-    __name__, commands={"compare": "command:Compare"}, public={"compare": "command:Compare"}
+    __name__,
+    needs=["measured", "reports"],
+    commands={"compare": "command:Compare"},
+    public={"compare": "command:Compare"},
 )

@@ -102,7 +102,7 @@ class Compare(_Formed, Command):  # pyright: ignore[reportUntypedBaseClass]
         """Do the work of the command line."""
         from ...case.io.table_file import WRITERS, Kind
         from ...cli.destinations import curves_of
-        from ...report.sections import deliver
+        from ..reports.reports import deliver
         from . import designs as views
 
         refuse(self.unwritable(*PAGE))
@@ -175,8 +175,8 @@ def _name_of(case: str | Path | Case) -> str:
 def _tolerances_of(texts: Sequence[str], file: Path, designs: Designs) -> dict[str, float]:
     """Return accepted differences by output, in the units of the first design."""
     from ...case.io.document import unknown_name
-    from ...case.io.reference_curve import size_of
     from ...harness.table_units import in_table_units
+    from ..measured.reference_curve import size_of
 
     units = {name: each.unit for name, each in designs.results.records[0].outputs.items()}
     found: dict[str, float] = {}

@@ -141,7 +141,7 @@ class MeasureCompliance(Isolated, _Formed):  # pyright: ignore[reportUntypedBase
         )
         case = registry.case_of(with_values(self, supplied=supplied), driven=False)
         if self.bushings is not None and not table:
-            from ...case.io.mechanism_sections import with_bushings
+            from ..hardpoints.rubber import with_bushings
 
             case = with_bushings(case, self.bushings)
         case = with_springs(case, springs)

@@ -40,6 +40,7 @@ from ...trajectory import Array, PointMotion
 from ..hardpoints.suspension import PerTravel
 from ..statics.equilibrium import Equilibria, StaticModel
 from .rates import SIDES, Curve, wheel_rates
+from .released import released
 from .results import COMPLIANCE, LOAD, WHEEL_LOAD, ComplianceCurves, ComplianceResults
 from .rig import CONTACT, PER, Wheel, held_drivers, wheels_of
 from .section import Load, rig_of
@@ -113,7 +114,7 @@ def _load_text(load: Load, value: float) -> str:
 class _Study:
     def __init__(self, case: Case, axle: AxleMotion) -> None:
         self.case, self.axle, self.rig = case, axle, rig_of(case)
-        soft = case.mechanism.released()
+        soft = released(case.mechanism)
         held = held_drivers(case, self.rig, soft)
         self.wheels = wheels_of(case, held, soft)
         if len(self.wheels) == 1 and axle is not AxleMotion.HEAVE:

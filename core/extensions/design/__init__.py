@@ -6,7 +6,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["compare", "compliance", "hardpoints", "sweep"],
+    needs=["compare", "compliance", "hardpoints", "measured", "reports", "suspects", "sweep"],
     commands={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},
     proposals={"tune": "proposal:propose"},
     public={"tune": "tune_command:Tune", "fit": "fit_command:Fit"},

@@ -18,9 +18,9 @@ from ...case.case import Case
 from ...case.io.reader_options import CurveOptions
 from ...case.units import ANGLES, Unit
 from ...errors import KincheckError, unknown
-from ...harness.suspects import FACTORS
 from ...report.axis import ZERO
 from ...trajectory import Array
+from ..suspects.suspects import FACTORS
 from .goals import Movable, points_of, read_box, read_moves, times, travel_of
 from .identify import Combination, combinations, source, without_effect
 from .likely import Estimate, most_likely

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from ...case.case import TIME, Case
 from ...case.io.document import measure
 from ...case.io.reader_options import CurveOptions
-from ...case.io.reference_curve import with_curve
 from ...case.io.table import read_unit
 from ...case.models.files import load
 from ...case.units import LENGTHS, SECOND, Unit
@@ -22,6 +21,7 @@ from ...cli.shared_options import driver_value
 from ...errors import CaseError, KincheckError, unknown
 from ...trajectory import Array
 from ..hardpoints.options import WheelOptions
+from ..measured.reference_curve import with_curve
 from .rods import LENGTH, SHIM, ends_of, rods_of, with_sides
 
 GOAL = '--goal "OUTPUT [at TRAVEL] = VALUE +- TOLERANCE UNIT"'

@@ -19,10 +19,11 @@ from ...report.axis import Axis, driver_axis
 from ...report.drawing import drawing
 from ...report.figures import OverDriver, Style, drawn_values
 from ...report.page_model import Plot
-from ...report.sections import Diagram, Report, environment, figure_parts, print_report
+from ...report.sections import Diagram, Report, environment, figure_parts
 from ...report.terminal import with_json
 from ...trajectory import Array
 from ...unit_text import with_unit
+from ..reports.reports import print_report
 from .goals import Goal, unit_in_table
 
 _GREY = "rgba(128,128,128,0.3)"

@@ -13,10 +13,10 @@ import numpy as np
 
 from ...case.case import PER_TRAVEL, TIME, Case, Output
 from ...case.io.reader_options import CurveOptions
-from ...case.io.reference_curve import with_curve
 from ...case.units import Unit
 from ...errors import KincheckError
 from ...trajectory import Array
+from ..measured.reference_curve import with_curve
 from ..sweep.curves import DesignCurves, curves
 from .goals import Goal, unit_in_table
 from .rubber import NULL as ON_RUBBER

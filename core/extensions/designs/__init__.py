@@ -6,5 +6,6 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
+    needs=["slopes"],
     public={"Designs": "design_batch:Designs", "solve_designs": "design_batch:solve_designs"},
 )

@@ -31,16 +31,17 @@ from ...kinematics.compiled.request import (
     SLOPE_OF,
     SMALLEST,
     TOWARDS,
+    Request,
     WantedOutput,
     accept_by,
     slots_of,
 )
-from ...kinematics.compiled.routes import SAME_TIME, Route, recent_route
+from ...kinematics.compiled.routes import SAME_TIME, Route, recent_route, start_of
 from ...kinematics.continuation.walk import FINER, ROOM, follow_samples
 from ...kinematics.formulation.acceptance_criteria import is_uncertain
 from ...kinematics.formulation.parameters import every_place, placed, places
 from ...kinematics.motion_solver import ONE_PROGRAM
-from ...kinematics.one_design import driving_of, parse_solve_arguments, prepare, start_notes
+from ...kinematics.one_design import driving_of, parse_solve_arguments, prepare
 from ...kinematics.structure.degrees_of_freedom import require_driven
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Motion, Path
@@ -513,3 +514,13 @@ def _numbers(place: str, given: Array, size: int) -> Array:
     if not np.isfinite(columns).all():
         raise SolveError(f"solve_designs: {place} is not finite everywhere; give finite numbers")
     return columns.T
+
+
+def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:
+    """Return notes on the assumed start of many designs, by the nominal one; none if the design
+    decides it.
+    """
+    start = start_of(mechanism, path)
+    if start.starts_at_design and not start.ambiguous:
+        return []
+    return [*prepare(mechanism, replace(request, varied=()), path)(tol).details.get("notes", ())]

@@ -18,12 +18,12 @@ from ...case.case import HELD_BUT, Case, Quantity
 from ...case.measures import ForceMeasure, JointAngle, Orientation
 from ...case.quantity import ORDERS
 from ...case.turns import Completion, over_sweep
-from ...dual_numbers import Slope, derivatives
 from ...jet import Jet
 from ...kinematics import NativeSolver, WantedOutput
 from ...kinematics.compiled.request import OUTPUT
 from ...mechanism.motions import Path
 from ...trajectory import QUANTITIES, Array
+from ..slopes.slopes import Slope, derivatives
 from .design_batch import Variants
 from .design_forces import ForcesOfDesigns
 from .prepared import PreparedDesigns, prepare_designs

@@ -13,12 +13,11 @@ from ...kinematics.compiled.request import OUTPUT, RESTING, WantedOutput
 from ...kinematics.compiled.routes import Route, Start
 from ...kinematics.forces.wanted import WantedForces
 from ...kinematics.native_solver import NativeSolver, ProgramSize
-from ...kinematics.one_design import start_notes
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import ITERATIONS
 from ...trajectory import QUANTITIES, Array
-from .design_batch import RECYCLED, Variants, slopes_of, solve_variants
+from .design_batch import RECYCLED, Variants, slopes_of, solve_variants, start_notes
 
 if TYPE_CHECKING:
     from .design_forces import ForcesOfDesigns

@@ -2,4 +2,4 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, commands={"doctor": "command:Doctor"})
+EXTENSION = Extension(__name__, needs=["environments"], commands={"doctor": "command:Doctor"})

@@ -17,13 +17,14 @@ import msgspec
 
 from ...case.case import Case
 from ...doors import offers
-from ...extras import how_to_add, how_to_install, python_of
+from ...extras import how_to_install
 from ...harness.engine import PATIENCE, Engine
 from ...harness.provenance import circumstances
 from ...harness.record import Outcome
 from ...harness.run import run
 from ...program import disk_cache
 from ...program.executor import compiler
+from ..environments.environments import how_to_add, python_of
 
 SCHEMA = "kincheck-doctor/1"
 # Extras of the package and their purposes, except engines. Requirements without an extra are

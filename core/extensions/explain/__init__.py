@@ -4,7 +4,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["designs", "sweep"],
+    needs=["closing", "designs", "slopes", "sweep"],
     commands={"explain": "command:Explain"},
     public={"explain": "command:Explain"},
 )

@@ -7,7 +7,7 @@ parameters of the geometry,
     dq = J^-1 d(residual)          shift of the pose by a solver's residuals
     dq = -J^-1 (d phi / dg) dg     shift of the pose by a moved hardpoint, drivers held
 
-so both are one factorisation; d phi / dg is exact (see `core.dual_numbers`). A redundant row, left
+so both are one factorisation; d phi / dg is exact (see `slopes`). A redundant row, left
 out of J, need not hold for the changed geometry: its residual is the contradiction in this
 geometry.
 """
@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Vec3
-from ...dual_numbers import Slope, derivatives
 from ...kinematics.compiled.compiled_model import compile_model
 from ...kinematics.compiled.request import Request
 from ...kinematics.continuation.segments import choose_rows
@@ -36,6 +35,7 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...primitives.base import GROUND_POSE, Drive
 from ...trajectory import Array, Trajectory
+from ..slopes.slopes import Slope, derivatives
 from .rank import Screw, screws
 
 

@@ -12,13 +12,13 @@ import numpy as np
 from ...algebra import Vec3
 from ...case.case import ORDERS, Case, Quantity, without_forces
 from ...case.quantity import still_jets
-from ...dual_numbers import derivatives, value
 from ...harness.compare import numbers as as_numbers
 from ...jet import Jet
 from ...joints import Kind
 from ...mechanism.motions import PointCoordinate
 from ...trajectory import Array
 from ..designs.outputs import DesignOutputs
+from ..slopes.slopes import derivatives, value
 from ..sweep.varied_places import Geometry, Moves, Variable
 from .conditioning import Conditioning, PoseConditioning
 

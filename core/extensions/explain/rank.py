@@ -30,11 +30,11 @@ from ...kinematics.structure.redundancy import (
     RANK_TOLERANCE,
     independent_joint_rows,
     independent_rows,
-    parts_of_columns,
 )
 from ...mechanism.mechanism import Mechanism, Vector
 from ...primitives.base import Twist
 from ...trajectory import Array
+from ..closing.reduction import parts_of_columns
 
 # Parts of a motion below this share of its largest are left out: round-off of a null vector is far
 # below, what moves is above.

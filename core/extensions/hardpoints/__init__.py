@@ -6,6 +6,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
+    needs=["slopes", "yaml"],
     commands={"templates": "command:PrintTemplates"},
     completions={"template": "templates:TEMPLATES"},
     sections={"suspension": "suspension_section:SECTION"},

@@ -21,12 +21,12 @@ from ...case.io.outputs import default, with_all_coordinates
 from ...case.io.schema import MOST_SAMPLES
 from ...case.quantity import AXES, with_markers
 from ...case.units import LENGTHS
-from ...dual_numbers import Slope, derivatives
 from ...joints import Joint, Translational
 from ...kinematics import places
 from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ...mechanism.motions import Driver, JointDisplacement, Motion, PointCoordinate, Ramp, Table
 from ...trajectory import Array
+from ..slopes.slopes import Slope, derivatives
 from .options import WheelOptions
 from .suspension import SWING_ARMS, Axle, Convention, Side, SuspensionOutput, Vehicle
 from .suspension.corner import MARKER_DISTANCE

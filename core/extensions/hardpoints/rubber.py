@@ -15,7 +15,9 @@ from typing import Any
 import msgspec
 
 from ...case.case import Case
-from ...case.io.mechanism_sections import bushings_in, with_bushings
+from ...case.io.document import Section, parse, read_text
+from ...case.io.mechanism_sections import LARGEST, read_bushings
+from ...errors import CaseError
 from ...joints import Distance, Joint
 from ...joints.base import triad
 from ...mechanism.body import Body
@@ -262,3 +264,51 @@ def sample_bushings(template: Template) -> str:
     if template.steered:
         lines += ["", f"# {TIEROD_INNER} takes one too, as the stiffness of rack or steering"]
     return "\n".join(lines)
+
+
+def bushings_in(file: Path, *tables: str) -> Section:
+    """Return the tables of a file of bushings.
+
+    Args:
+        tables: names of its tables.
+
+    Raises:
+        CaseError: the file cannot be read, or has other tables or keys.
+    """
+    text = read_text(file, LARGEST, "it holds the bushings of one suspension")
+    try:
+        root = Section(file, "", parse(file, text))
+        root.require_keys(tables)
+        for _, joint in root.at("joints").each():
+            joint.require_keys(("bushings",))
+        return root
+    except CaseError as error:
+        raise CaseError(
+            f"{error}. --bushings takes TOML, [bushings.ROLE] as kincheck templates NAME --bushings"
+            " prints, or [joints.NAME.bushings.X]"
+        ) from None
+
+
+def with_bushings(case: Case, file: Path, *tables: str) -> Case:
+    """Return a case with the bushings in a file of tables [joints.NAME.bushings.X], in SI units,
+    beside its own: tables of hardpoints have none.
+
+    Args:
+        tables: names of other tables of the file.
+
+    Raises:
+        CaseError: the file cannot be read, or names an unknown joint.
+    """
+    root, joints = bushings_in(file, "joints", *tables), case.mechanism.given_joints
+    names = [joint.name for joint in joints]
+    for name, section in root.at("joints").each():
+        section.require(name, names, "a joint")
+    found = read_bushings(root, joints)
+    if not found:
+        raise root.at("joints").fault(
+            "found no bushing, expected tables [joints.NAME.bushings.X], or, for a table of"
+            " hardpoints, [bushings.ROLE]. Add one"
+        )
+    bushings = (*case.mechanism.bushings, *found)
+    with root.at("joints").explained():
+        return replace(case, mechanism=replace(case.mechanism, bushings=bushings))

@@ -20,10 +20,10 @@ from typing import Any, TypeAlias, cast
 from ...case.io.document import check_values, fault, parse, parse_json, shown, unknown_name
 from ...case.io.lines import join
 from ...case.io.table import is_number
-from ...case.io.toml_text import parse_yaml
 from ...case.units import LENGTHS
 from ...errors import brief, remedy, sentence, shortened
 from ...mechanism.mechanism import Vector
+from ..yaml.reading import parse_yaml
 from .options import NOTHING, WheelOptions
 from .programs import without_comments
 from .table import (

@@ -4,7 +4,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["designs", "proofs", "sweep", "compliance", "statics", "llvm"],
+    needs=["compliance", "designs", "llvm", "proofs", "reports", "statics", "sweep"],
     commands={"bench": "command:BenchAll", "stress": "command:StressEngines"},
     sources={"bench": "source:BenchOfRun"},
     styles={

@@ -98,8 +98,8 @@ def _measure_engines(options: BenchEngines, registry: Registry, *, formulation: 
     from ...cli.destinations import json_only
     from ...extras import THREADS
     from ...harness.record import Outcome
-    from ...report.sections import deliver
-    from ...report.terminal import Meter
+    from ..reports.reports import deliver
+    from ..sweep.meter import Meter
     from .bench import engines as bench_engines
     from .bench.report import report
     from .paper import formulation as bench_formulation
@@ -355,8 +355,8 @@ class StressEngines(Command):
         """Do the work of the command line."""
         from ...cli.destinations import json_only
         from ...harness.engine import STANDARD
-        from ...report.sections import deliver
         from ...report.terminal import page, table_without_heads
+        from ..reports.reports import deliver
         from .stress.families import FAMILIES
         from .stress.report import idle, markdown, report
         from .stress.verdicts import BAD
@@ -414,7 +414,7 @@ def _run(
     """
     from msgspec.structs import replace
 
-    from ...report.terminal import Meter
+    from ..sweep.meter import Meter
     from .stress.reduction import save
     from .stress.run import stress
 

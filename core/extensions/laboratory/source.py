@@ -27,6 +27,8 @@ class BenchOfRun(EngineSource):
     @staticmethod
     def efforts(options: Any) -> Any:
         """Return the efforts of a file of kincheck bench."""
+        if options.bench is None:
+            return None
         from .bench.engines import efforts_in
 
-        return None if options.bench is None else efforts_in(options.bench)
+        return efforts_in(options.bench)

@@ -13,9 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...algebra import quat, rotation_less_identity, vec
 from ...dataset import Dataset
+from ...harness.scene_record import Scene
+from ...mechanism.mechanism import GROUND, MARKER, Mechanism
 from ...report.figures import COLOURS
+from ...trajectory import Array
 from ...unit_text import with_unit
+from .tables import columns_of, curves_of, table_of
 
 MOST_ROWS, MOST_COLUMNS, MOST_LINES, MOST_DIAGRAMS = 10, 10, 24, 9
 """Rows and columns of a table, lines of a diagram, and diagrams; the rest is left out, and said."""
@@ -44,7 +49,7 @@ def to_html(title: str, data: Dataset) -> str:
 
 
 def _table(data: Dataset) -> str:
-    columns, units = data.table(), {name: each.unit for name, each in data.columns().items()}
+    columns, units = table_of(data), {name: each.unit for name, each in columns_of(data).items()}
     count = len(next(iter(columns.values()), ()))
     half = MOST_ROWS // 2
     rows = [*range(count)] if count <= MOST_ROWS else [*range(half), *range(count - half, count)]
@@ -70,7 +75,7 @@ def _number(value: Any) -> str:
 def _diagrams(data: Dataset) -> Iterator[str]:
     """Yield a diagram for each variable with curves."""
     across = data.coords[data.x]
-    curves = data.curves()
+    curves = curves_of(data)
     shown = data.shown or [*curves][:MOST_DIAGRAMS]
     for name in shown:
         columns = curves[name]
@@ -199,3 +204,53 @@ def _moving_line(ends: NDArray[np.float64], colour: str, look: str) -> str:
         else ""
     )
     return f"<path d='{drawn[0]}' stroke='{colour}'{look}>{motion}</path>"
+
+
+def mechanism_view(title: str, mechanism: Mechanism) -> str:
+    """Return the design position as HTML, below a title."""
+    placed = [
+        (body, P)
+        for joint in mechanism.joints
+        for body in joint.bodies
+        for P in joint.points_on(body)
+    ]
+    placed += [
+        (point.body, point.position)
+        for point in mechanism.points
+        if not point.name.startswith(MARKER)
+    ]
+    spots = [(body, [P]) for body, P in placed]
+    pairs = [joint.points_on() for joint in mechanism.joints if len(joint.points_on()) == 2]
+    rods = [([a], [b]) for a, b in pairs]
+    fixed = {each.name for each in mechanism.bodies if each.fixed} | {GROUND}
+    return view(title, spots, rods, fixed)
+
+
+def scene_view(title: str, scene: Scene) -> str:
+    """Return the motion for a notebook, in at most `MOST_FRAMES` frames."""
+    bodies = {body.name: body for body in scene.bodies}
+    spots: list[tuple[str, Array]] = []
+    rods: list[tuple[Array, Array]] = []
+    count = max(1, len(scene.frames))
+    some = np.unique(np.linspace(0, count - 1, min(count, MOST_FRAMES)).round().astype(int))
+
+    def at(name: str, place: Sequence[float]) -> Array:
+        body = bodies.get(name)
+        if body is None or not body.r:
+            return np.tile(place, (len(some), 1))
+        first = quat(body.euler_parameters).conjugate()
+        arm = vec(np.subtract(place, body.origin).tolist())
+        turned = rotation_less_identity(quat(np.array(body.p)[some].T) * first) @ arm + arm
+        return np.array(body.r)[some] + np.stack([*turned], axis=1)
+
+    for joint in scene.joints:
+        places = 2 * joint.points if len(joint.points) == 1 else joint.points
+        ends = [at(*each) for each in zip(joint.bodies, places, strict=False)]
+        spots += zip(joint.bodies, ends, strict=False)
+        rods += [(ends[0], ends[1])] if len(joint.points) == 2 else []
+    spots += [(point.body, at(point.body, point.position)) for point in scene.points]
+    return view(title, spots, rods, {b.name for b in scene.bodies if b.fixed} | {GROUND})
+
+
+MOST_FRAMES = 25
+"""Frames of a view in a notebook."""

@@ -16,13 +16,13 @@ from ...algebra import Vec3
 from ...kinematics.compiled.compiled_model import compile_model
 from ...kinematics.compiled.request import Request
 from ...kinematics.compiled.routes import start_of
-from ...kinematics.continuation.segments import choose_rows_at
+from ...kinematics.continuation.segments import choose_rows
 from ...kinematics.continuation.sweep import sweep
 from ...kinematics.forces.reactions import Follow, ForceRows, with_forces
 from ...kinematics.forces.wanted import WantedForces, wanted_forces
 from ...kinematics.formulation.cartesian import Cartesian
 from ...kinematics.formulation.constraints import frames
-from ...kinematics.formulation.state_vectors import displaced, state_of
+from ...kinematics.formulation.state_vectors import displaced, jacobian, standing_drives, state_of
 from ...kinematics.structure.degrees_of_freedom import select_rows
 from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
@@ -230,3 +230,23 @@ def _states(mechanism: Mechanism, native: Trajectory, times: Array, start: float
             outward = side[native.solved[side]]
             turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]
     return np.stack([x for vector in state.values() for x in vector], axis=1)
+
+
+def choose_rows_at(
+    mechanism: Mechanism, change: Mapping[str, float], state: Array, known: tuple[int, ...]
+) -> tuple[int, ...]:
+    """As `choose_rows`, at a pose of the native formulation.
+
+    Args:
+        change: of the moving drivers from the design [SI].
+        state: the scalars of the pose, in the order of `Cartesian.design`.
+    """
+    frame = frames(mechanism)
+    formulation = Cartesian.of(mechanism, frame, standing_drives(mechanism, frame.unit, change))
+    numbers = iter(state.tolist())
+    at = formulation.configuration(
+        {name: [next(numbers) for _ in value] for name, value in formulation.design.items()}
+    )
+    return choose_rows(
+        jacobian(formulation, at), [known], len(mechanism.drivers), formulation.conditions
+    )

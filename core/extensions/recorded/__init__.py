@@ -4,6 +4,6 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["residuals", "xml"],
+    needs=["residuals", "suspects", "xml"],
     sources={"recordings": "source:Recordings", "program": "source:Program"},
 )

@@ -16,9 +16,9 @@ from ...case.io.reference_samples import RATES
 from ...case.units import LENGTHS
 from ...errors import shortened
 from ...harness.compare import Curve, curve_of, deviation
-from ...harness.suspects import FACTORS, OTHER_SIGN, slips
 from ...trajectory import Array
 from ...unit_text import value_text
+from ..suspects.suspects import FACTORS, OTHER_SIGN, slips
 from .meaning import MAP
 
 # Places of the driver's zero that are tried, and samples of the curves to try them on: far denser

@@ -3,5 +3,7 @@
 from ...doors import Extension
 
 EXTENSION = Extension(
-    __name__, needs=["free", "residuals", "trees", "xml"], commands={"same": "command:Same"}
+    __name__,
+    needs=["closing", "free", "residuals", "trees", "xml"],
+    commands={"same": "command:Same"},
 )

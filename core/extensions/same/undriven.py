@@ -13,8 +13,8 @@ import numpy as np
 from ...case.case import Case
 from ...case.models.files import load
 from ...joints import Revolute, Translational
-from ...kinematics import reduce_rows
 from ...mechanism.mechanism import Mechanism
+from ..closing.reduction import reduce_rows
 from ..trees.case import undriven_mechanism
 from ..trees.gluing import glue
 from ..trees.laws import Laws, laws_of, tendons_of

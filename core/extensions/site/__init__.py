@@ -2,4 +2,6 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, needs=["bisect", "board"], commands={"site": "command:BuildSite"})
+EXTENSION = Extension(
+    __name__, needs=["bisect", "board", "reports"], commands={"site": "command:BuildSite"}
+)

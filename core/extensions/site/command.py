@@ -25,7 +25,8 @@ class BuildSite(Command):
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ...case.io.atomic_files import write_all
-        from ...report.sections import page, print_report
+        from ...report.sections import page
+        from ..reports.reports import print_report
         from .documents import documents
         from .page import report
 

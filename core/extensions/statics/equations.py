@@ -49,7 +49,7 @@ from ...program import (
     maximum,
 )
 from ...program.executor import Executor
-from ...program.tape import folded, jacobian
+from ...program.tape import OPERATIONS, Traced, jacobian, live, where_larger
 from ...trajectory import Array
 
 STEP, SIGNS, DETERMINANT = "step", "signs", "determinant"
@@ -376,3 +376,22 @@ def motion_of(columns: Mapping[str, int], motion: Array) -> str:
     size = float(np.abs(along).max())
     axis = ", ".join(f"{round(float(x) / size, 6) + 0.0:.3g}" for x in along)
     return f"body {name!r} {'turns about' if turning else 'moves along'} [{axis}]"
+
+
+def folded(tape: Tape, values: Sequence[Scalar], known: Mapping[int, Scalar]) -> list[Scalar]:
+    """Return scalars with numbers in place of some inputs, by slot, or with scalars of one other
+    kind in place of all: all operations fold again.
+    """
+    new: dict[int, Scalar] = {}
+    for number in live(tape, values):
+        op, *rest = tape.nodes[number]
+        if op == "input":
+            new[number] = known.get(int(rest[0]), tape.scalars[number])
+        elif op == "const":
+            new[number] = float(rest[0])
+        elif op == "where":
+            _, *sizes = tape.nodes[int(rest[0])]
+            new[number] = where_larger(*(new[int(k)] for k in (*sizes, *rest[1:])))
+        elif op != "larger":  # which "where" reads itself
+            new[number] = OPERATIONS[str(op)](*(new[int(k)] for k in rest))
+    return [new[each.number] if isinstance(each, Traced) else each for each in values]

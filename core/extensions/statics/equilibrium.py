@@ -219,7 +219,7 @@ class Equilibria:
 
 
 class StaticModel:
-    """A mechanism ready for statics. Its drivers are held; `Mechanism.released` has bushings in
+    """A mechanism ready for statics. Its drivers are held; `compliance.released` has bushings in
     place of joints.
 
     Raises:

@@ -298,8 +298,8 @@ def _solve(
     stops: list[KeyboardInterrupt | KincheckError],
     problems: list[str],
 ) -> SweepResults:
-    from ...report.terminal import Meter
     from .chunk_files import ParquetStore
+    from .meter import Meter
     from .sweep import Check, on_cluster
 
     def show_progress(progress: Progress) -> None:

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from ...case.units import ANGLES, LENGTHS, in_units
+from ...case.units import ANGLES, LENGTHS, Unit
 from ...dataset import Dataset, Variable
 from ...errors import number_of
 from ...harness.compare import numbers
@@ -333,3 +333,18 @@ def correlations(study: Study) -> list[Correlated]:
         Correlated(coordinates=[names[row] for row in each.rows], matrix=each.matrix.tolist())
         for each in study.variation.correlations
     ]
+
+
+def in_units(unit: str, length: Unit, angle: Unit) -> tuple[str, float]:
+    """Return the name of an SI unit, N and s as they are, with other units of length and angle, and
+    the size of one of it [SI]: N m with mm is N mm, a thousandth.
+    """
+    size, powers = 1.0, (1, *[-1] * unit.count("/"))
+    parts = list[str]()
+    for part, power in zip(unit.split("/"), powers, strict=True):
+        names = [{"m": length, "rad": angle}.get(name, name) for name in part.split(" ")]
+        for name in names:
+            if isinstance(name, Unit):
+                size = name.power(size, power)
+        parts.append(" ".join(name.name if isinstance(name, Unit) else name for name in names))
+    return "/".join(parts), size

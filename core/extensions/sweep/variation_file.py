@@ -15,12 +15,13 @@ from ...case.case import Case, Quantity
 from ...case.io.document import decimal, fault, read_tables, shown, typed
 from ...case.io.lines import join
 from ...case.io.table import read_unit
-from ...case.units import ANGLES, LENGTHS, RADIAN, in_units
+from ...case.units import ANGLES, LENGTHS, RADIAN
 from ...errors import KincheckError, remedy, unknown
 from ...joints import Kind
 from ...mechanism.body import ANGLE, LENGTH, Dimension
 from ...mechanism.motions import PointCoordinate
 from ...trajectory import PER_TIME, QUANTITIES, Array
+from .results import in_units
 from .study_choices import Mode
 from .variation import Coordinate, Correlation, FileUnits, Law, Limit, Variation, problem_of
 from .variation_schema import (

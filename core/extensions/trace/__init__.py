@@ -2,4 +2,8 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, commands={"trace": "command:Trace"})
+EXTENSION = Extension(
+    __name__,
+    commands={"trace": "command:Trace"},
+    public={"Curve": "curve:Curve", "Event": "curve:Event", "trace": "curve:trace"},
+)

@@ -15,7 +15,7 @@ from ...options import (
 )
 
 if TYPE_CHECKING:
-    from ...kinematics import Curve, Event
+    from .curve import Curve, Event
 
 LENGTH = 5.0
 """Default length in each direction: a few full turns of all bodies."""
@@ -48,8 +48,8 @@ class Trace(OfCase):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...kinematics import trace
         from ...report.terminal import with_json
+        from .curve import trace
 
         case = registry.case_of(self)
         drivers = [driver.name for driver in case.mechanism.drivers]

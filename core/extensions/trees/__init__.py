@@ -10,6 +10,6 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["xml"],
+    needs=["closing", "xml", "yaml"],
     readers={"mjcf": "reader:MJCF", "urdf": "reader:URDF", "sdf": "reader:SDF"},
 )

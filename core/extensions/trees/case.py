@@ -14,9 +14,7 @@ import numpy as np
 
 from ...algebra import X, Y, vec
 from ...case.case import Case, Sweep, Truth
-from ...case.closing import within_digits
 from ...case.io.document import SMALLEST, explained, usable
-from ...case.io.outputs import with_all_motions
 from ...case.io.readers import LEFT_OUT
 from ...errors import WARNING, CaseError, MechanismError, shortened
 from ...joints import (
@@ -29,13 +27,14 @@ from ...joints import (
     Spherical,
     Spline,
     Translational,
-    linear_relation,
 )
-from ...kinematics import degrees_of_freedom, reduce_rows
+from ...kinematics import degrees_of_freedom
 from ...mechanism.body import Body, Inertia, checked_inertia
 from ...mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism, Point
 from ...mechanism.motions import Absolute, Driver, JointAngle, JointDisplacement, Motion, Table
+from ..closing.digits import within_digits
+from ..closing.reduction import reduce_rows
 from ..xml.element import Names
 from .assembly import Assembled, assemble
 from .driving import (
@@ -49,7 +48,9 @@ from .driving import (
     read_start,
 )
 from .gluing import glue
+from .linear_relation import linear_relation
 from .options import ModelOptions
+from .outputs import with_all_motions
 from .place import Place, coordinates, rotation_vector
 from .spins import Spin, find_spins
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, sum_of_masses

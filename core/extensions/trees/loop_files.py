@@ -50,12 +50,12 @@ from ...case.io.document import (
     usable,
 )
 from ...case.io.lines import join, place
-from ...case.io.toml_text import parse_yaml
 from ...errors import WARNING, CaseError, remedy, shortened, similar
 from ...joints.base import triad
 from ...joints.polynomial import HIGHEST
 from ...mechanism.mechanism import Vector
 from ..xml.element import Element, unit_vector
+from ..yaml.reading import parse_yaml
 from .graph import Freedom, Graph, Joint
 from .place import ORIGIN, Place, unit_quaternion
 from .tree import Closure, Coupling, Kind, Move, Tree, require_spline

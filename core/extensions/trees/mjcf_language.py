@@ -14,9 +14,9 @@ from pathlib import Path
 
 from ...algebra import IDENTITY, ZERO, Quat, X, Y, Z, cross, quat, vec
 from ...case.io.document import read_text, shown
-from ...case.io.ledger import Asked
 from ...case.io.readers import LARGEST_FILE
 from ..xml.element import MOST_ELEMENTS, ZEROS, Apart, Element, file_near, parse_xml, words
+from ..xml.ledger import Asked
 from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion
 
 ORIENTATION = words("quat axisangle xyaxes zaxis euler")

@@ -20,8 +20,8 @@ from xml.parsers import expat
 
 from ...algebra import Vec3, vec
 from ...case.io.document import decimal, fault, shown, unknown_name, usable
-from ...case.io.ledger import Asked
 from ...errors import CaseError, remedy, similar
+from .ledger import Asked
 
 # Elements are some ten deep; but bodies of MJCF are in the bodies that carry them.
 DEEPEST, DEEPEST_BODY = 200, 5_000

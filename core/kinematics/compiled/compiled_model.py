@@ -35,7 +35,6 @@ from ...trajectory import Array
 from ..formulation.constraints import Frames
 from ..formulation.state_vectors import samples
 from ..formulation.styles import MIXED, NATIVE
-from ..structure.components import Alike
 from ..structure.degrees_of_freedom import Selection
 from . import step_programs
 from .request import (
@@ -59,6 +58,7 @@ from .request import (
 )
 
 if TYPE_CHECKING:
+    from .programs import Alike
     from .solution import ForceTable
 
 CORE = pathlib.Path(__file__).parents[2]

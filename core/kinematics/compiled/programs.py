@@ -16,10 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, reduce
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
-from ...algebra import Scalar, quat, vec
-from ...mechanism.mechanism import Mechanism
+from ...algebra import Quat, Scalar, Vec3, quat, vec
+from ...mechanism.mechanism import Mechanism, Vector
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Twist
 from ...program import Elimination, Prepared, Program, Tape, absolute, maximum, minimum, program
 from ...trajectory import QUANTITIES
@@ -37,7 +37,6 @@ from ..formulation.formulation import (
 from ..formulation.parameters import every_place, placed
 from ..formulation.state_vectors import turns
 from ..formulation.styles import NATIVE, formulate
-from ..structure.components import Alike, select_section
 from ..structure.degrees_of_freedom import Selection, select_rows
 from .request import (
     BLOCKS,
@@ -62,6 +61,31 @@ Further: TypeAlias = Callable[[dict[int, Scalar], Sequence[Scalar], Sequence[Sca
 
 def nothing_further(out: dict[int, Scalar], v: Sequence[Scalar], a: Sequence[Scalar]) -> None:
     """Add nothing."""
+
+
+class Section(Protocol):
+    """A part of a mechanism that is solved on its own."""
+
+    @property
+    def points(self) -> Mapping[str, tuple[str, Vector, Vec3]]: ...
+    @property
+    def outputs(self) -> Mapping[str, tuple[Vector, Vec3, Quat]]: ...
+    def formulation(
+        self, prescribed: Mapping[str, PrescribedBody], drives: Mapping[str, Drive]
+    ) -> Cartesian: ...
+
+
+class Alike(Protocol):
+    """Sections that differ in some of their numbers only."""
+
+    @property
+    def frame(self) -> Frames: ...
+    @property
+    def given(self) -> Sequence[str]: ...
+    @property
+    def numbers(self) -> list[Scalar]: ...
+    def with_numbers(self, given: Sequence[Scalar]) -> Section: ...
+    def select(self) -> Selection: ...
 
 
 class Tracer:
@@ -92,9 +116,8 @@ class Tracer:
         if selection is not None:
             self.selection = selection
         if alike:
-            self.frame = Frames(alike.first.unit, {}, alike.first.bodies)
-            known = alike.numbers
-            self.geometry = {"geometry": [known[k] for k in alike.varied]} if alike.varied else {}
+            self.frame, varied = alike.frame, alike.numbers
+            self.geometry = {"geometry": varied} if varied else {}
         else:
             self.frame, known = frame or frames(mechanism), every_place(mechanism)
             self.geometry = {place: known[place] for place in request.varied}
@@ -103,7 +126,7 @@ class Tracer:
         slots = {slot for place in given for slot in self.layout.vectors[place]}
         self.prepared = Prepared(self.tape, slots, self.layout.scalar)
         self.prescribed = {
-            name: self._prescribed_body(name) for name in (alike.first.given if alike else ())
+            name: self._prescribed_body(name) for name in (alike.given if alike else ())
         }
         self.drives = {name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers}
         if alike:
@@ -169,7 +192,7 @@ class Tracer:
     def selection(self) -> Selection:
         """Raises SolveError: the mechanism cannot be solved as described, see `select_rows`."""
         if self._alike:
-            return select_section(self._alike.first)
+            return self._alike.select()
         formulation = self.formulate(*self.described, {})
         return select_rows(*self.described, formulation, self.request.rows)
 

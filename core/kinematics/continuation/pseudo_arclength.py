@@ -50,6 +50,15 @@ PLACES = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
 # Cubics through the four nodes on either side are off by about NODE ** 4 where the nodes begin:
 # their zeros meet at a bifurcation.
 MEETS = 1e-6
+# A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be
+# cheap, near enough to be drawn.
+LONGEST = 0.05
+# A march that fails is left this near [units of the mechanism's size, rad] to the limit point that
+# stopped it, or it was something else.
+NEARBY = 0.5
+# Ten times the steps that such a way takes; equations whose rows are wrong would have it creep on
+# and on.
+ATTEMPTS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,36 +218,14 @@ class ArclengthWalk:
             )
             last_b = is_b
         far = abs(best.dt) > STATIONARY
-        if far and (nodes := self._nodes(before, after, best.arc - before.arc)) is not None:
+        if far and (nodes := self.nodes(before, after, best.arc - before.arc)) is not None:
             offsets, spots = nodes
-            root = _root(offsets, np.array([spot.dt for spot in spots]))
+            root = root_near(offsets, np.array([spot.dt for spot in spots]))
             if np.isfinite(root):
-                return NearbyPoint(best, best.arc + root, _time_between(offsets, spots, root))
+                return NearbyPoint(best, best.arc + root, time_between(offsets, spots, root))
         return NearbyPoint(best, best.arc, best.time)
 
-    def branch_point(self, before: CurvePoint, after: CurvePoint) -> NearbyPoint | None:
-        """Return the branch point between two spots, or None.
-
-        Corrections do not converge there, but sigma falls to zero linearly on both sides: with its
-        sign changed on one side it is smooth, and its zero is interpolated. A minimum of sigma
-        other than zero has no such line.
-        """
-        centre = self._least(before, after.arc - before.arc)
-        nodes = self._nodes(before, after, centre)
-        if nodes is None:
-            return None
-        offsets, spots = nodes
-        signed = np.sign(offsets) * np.array([spot.sigma for spot in spots])
-        from_left, from_right, root = (
-            _root(offsets[kept], signed[kept]) for kept in (slice(4), slice(4, 8), slice(8))
-        )
-        if not abs(from_left - from_right) <= MEETS:
-            return None
-        return NearbyPoint(
-            spots[3], before.arc + centre + root, _time_between(offsets, spots, root)
-        )
-
-    def _nodes(
+    def nodes(
         self, before: CurvePoint, after: CurvePoint, centre: float
     ) -> tuple[Array, list[CurvePoint]] | None:
         """Return spots on both sides of a length from the first, and their lengths; None if any is
@@ -248,17 +235,6 @@ class ArclengthWalk:
         found = [self.advance(before, centre + offset) for offset in offsets.tolist()]
         spots = [spot for spot in found if spot is not None]
         return (offsets, spots) if len(spots) == len(found) else None
-
-    def _least(self, before: CurvePoint, length: float) -> float:
-        """Return the length to the least sigma, by golden section; 0 stands for unreached poses."""
-        part = 0.5 * (np.sqrt(5.0) - 1.0)
-        a, b = 0.0, length
-        while b - a > 0.01 * length:
-            c, d = b - part * (b - a), a + part * (b - a)
-            spots = self.advance(before, c), self.advance(before, d)
-            at_c, at_d = (spot.sigma if spot else 0.0 for spot in spots)
-            a, b = (a, d) if at_c < at_d else (c, b)
-        return 0.5 * (a + b)
 
 
 def _spot(found: Equations, state: Array, time: float, along: Array, arc: float) -> CurvePoint:
@@ -290,14 +266,35 @@ def _solution(matrix: Array, b: Array) -> Array:
     return np.asarray(np.linalg.solve(matrix, b), dtype=np.float64)
 
 
-def _time_between(offsets: Array, spots: Sequence[CurvePoint], at: float) -> float:
+def time_between(offsets: Array, spots: Sequence[CurvePoint], at: float) -> float:
     """The time at an offset among spots, interpolated."""
     times = [spot.time for spot in spots]
     return float(np.polynomial.Polynomial.fit(offsets, times, len(times) - 1)(at))
 
 
-def _root(x: Array, y: Array) -> float:
+def root_near(x: Array, y: Array) -> float:
     """Return the zero nearest to zero of the polynomial through points, or NaN."""
     roots = np.polynomial.Polynomial.fit(x, y, len(x) - 1).roots()
     real = roots.real[np.abs(roots.imag) <= MEETS]
     return float(real[np.abs(real).argmin()]) if len(real) else np.nan
+
+
+def limit_ahead(
+    system: System, path: Path, state: Array, time: float, direction: int, tol: float
+) -> NearbyPoint | None:
+    """Return the limit point close ahead of a pose in a direction of time, or None."""
+    walk = ArclengthWalk(system, path, tol)
+    try:
+        spot = walk.begin(state, time, direction)
+    except np.linalg.LinAlgError:
+        return None
+    for after in walk.spots_after(spot, NEARBY, LONGEST, ATTEMPTS):
+        if turns_back(spot, after):
+            return walk.limit(spot, after)
+        spot = after
+    return None
+
+
+def turns_back(before: CurvePoint, after: CurvePoint) -> bool:
+    """Return whether the driver's value is stationary between two spots; a spot counts once."""
+    return (before.dt < 0.0) != (after.dt < 0.0)

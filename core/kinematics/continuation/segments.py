@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...failures import FailureKind
-from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...trajectory import Array
 from ..compiled.compiled_model import Model, recent_model
@@ -24,10 +23,7 @@ from ..compiled.dense_equations import system_of
 from ..compiled.request import CONSISTENT, FROM, LARGEST_SIGMA, SIGMA
 from ..compiled.routes import Route
 from ..formulation.acceptance_criteria import LOW, is_uncertain, needs_check
-from ..formulation.cartesian import Cartesian
-from ..formulation.constraints import frames
 from ..formulation.formulation import Condition
-from ..formulation.state_vectors import jacobian, standing_drives
 from ..structure.redundancy import independent_rows
 from .singular_poses import bridge, onward
 from .walk import End, March, follow_samples, lane_at_start, route_from_start, time_of
@@ -100,26 +96,6 @@ def choose_rows(
     rows = tuple(independent_rows(matrix, drivers, conditions))
     # where the mechanism is singular there are fewer
     return rows if len(rows) == len(best) else best
-
-
-def choose_rows_at(
-    mechanism: Mechanism, change: Mapping[str, float], state: Array, known: tuple[int, ...]
-) -> tuple[int, ...]:
-    """As `choose_rows`, at a pose of the native formulation.
-
-    Args:
-        change: of the moving drivers from the design [SI].
-        state: the scalars of the pose, in the order of `Cartesian.design`.
-    """
-    frame = frames(mechanism)
-    formulation = Cartesian.of(mechanism, frame, standing_drives(mechanism, frame.unit, change))
-    numbers = iter(state.tolist())
-    at = formulation.configuration(
-        {name: [next(numbers) for _ in value] for name, value in formulation.design.items()}
-    )
-    return choose_rows(
-        jacobian(formulation, at), [known], len(mechanism.drivers), formulation.conditions
-    )
 
 
 def _sigma(matrix: Array, rows: Sequence[int]) -> float:

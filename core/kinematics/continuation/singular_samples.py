@@ -25,6 +25,7 @@ from ..compiled.dense_equations import System, system_of
 from ..compiled.request import SIGMA, TESTS
 from ..compiled.routes import LONGEST_KEPT, Route
 from ..formulation.acceptance_criteria import AMPLIFIED, WORSE
+from .pseudo_arclength import limit_ahead
 from .segments import BETTER, Followed
 from .singular_poses import (
     BEYOND,
@@ -38,7 +39,6 @@ from .singular_poses import (
     smallest_singular_values,
     solve_closely,
 )
-from .trace import limit_ahead
 from .walk import End, March
 
 # Of one march: the others are counted.
@@ -371,10 +371,12 @@ class _Scrutiny:
             state, way = system.state(end.lane[:, None]), 1 if end.wanted > time else -1
             ahead = limit_ahead(system, route.path, state, time, way, self.tol)
             if ahead is not None:
-                self.findings.add_pose("limit", route.path, ahead.value, ahead.singularity)
+                sample = route.sampled(np.array([ahead.spot.time]))
+                singularity = examine(system, ahead.spot.state, sample)
+                self.findings.add_pose("limit", route.path, ahead.time, singularity)
                 message += (
-                    f"; the limit of travel is {route.path.where(ahead.value)}:"
-                    f" {ahead.singularity.words}; kincheck trace goes on beyond"
+                    f"; the limit of travel is {route.path.where(ahead.time)}:"
+                    f" {singularity.words}; kincheck trace goes on beyond"
                 )
             elif (nearest := examine_lane(route, end.lane, time)).sigma < REGULAR:
                 message += f"; there, {nearest.words}"

@@ -18,6 +18,8 @@ from kincheck.core import (
     Translational,
     solve,
 )
+from kincheck.core.extensions.blocks.components import components, describe_components
+from kincheck.core.extensions.blocks.numbers_of import structure
 from kincheck.core.extensions.blocks.sparse_lanes import SparseLanes
 from kincheck.core.extensions.blocks.sparse_lu import Pattern
 from kincheck.core.extensions.laboratory.bench.size import LEAN, pivot, ring
@@ -25,7 +27,6 @@ from kincheck.core.kinematics import Method
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.motion_solver import ONE_PROGRAM
-from kincheck.core.kinematics.structure.components import components
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from scipy.sparse import linalg
 
@@ -36,6 +37,7 @@ from ...support.block_structures import (
     solve_sparse,
     with_one_program,
 )
+from ...support.loaded_slider_crank import loaded
 from ...support.mechanisms import (
     X,
     Z,
@@ -254,3 +256,21 @@ REFUSED = [
 def test_sparse_refusals_name_cause(mechanism, message):
     with pytest.raises(SolveError, match=message):
         SparseLanes(mechanism, Request(tuple(each.name for each in mechanism.drivers), ()))
+
+
+def test_component_programs_ignore_masses():
+    """Two loops alike but for their masses are one program."""
+    light = loaded()
+    heavy = replace(light, bodies=[replace(each, mass=7.0) for each in light.bodies], forces=())
+
+    def programs(mechanism):
+        """The structure of each component, with its numbers."""
+        parts = components(mechanism, frames(mechanism))
+        every = [each.name for each in mechanism.points], [each.name for each in mechanism.moving]
+        numbers: list[list[float]] = [[] for _ in parts]
+        found = describe_components(mechanism, parts, *every)
+        return [
+            (structure(each.section, own), own) for each, own in zip(found, numbers, strict=True)
+        ]
+
+    assert programs(heavy) == programs(light)

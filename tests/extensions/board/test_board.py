@@ -17,8 +17,8 @@ from kincheck.core.extensions.board.page import report
 from kincheck.core.extensions.board.results import Board, Row, Run, TruthFacts
 from kincheck.core.extensions.board.run import better, order_and_floor
 from kincheck.core.extensions.board.truth import truth_of
+from kincheck.core.extensions.environments.environments import python_of
 from kincheck.core.extensions.free.section import Free, with_free
-from kincheck.core.extras import python_of
 from msgspec.structs import replace as replace_row
 
 DATA = Path(__file__).parents[2] / "data"

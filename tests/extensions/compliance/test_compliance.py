@@ -13,6 +13,7 @@ from kincheck import adapters, cases
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
+from kincheck.core.extensions.compliance.released import released
 from kincheck.core.extensions.compliance.section import rig_of
 from kincheck.core.extensions.compliance.study import compliance
 from kincheck.core.extensions.statics.equilibrium import StaticModel
@@ -20,6 +21,7 @@ from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.mechanism.loads import Bushing
 from kincheck.core.mechanism.mechanism import Point
 
+from ...kinematics.test_bushings import bushed
 from ...support.by_night import sparse_by_day
 from ...support.engine_motion import SIMULATORS, installed
 
@@ -197,7 +199,7 @@ def test_axle_wheel_rates_heave_and_roll():
 def test_free_axle_compliance_equals_data():
     """Both wheels are free in height; loads and displacements at their centres."""
     rows = AXLE["rows"]
-    soft = load_case(AXLE_CASE).mechanism.released()
+    soft = released(load_case(AXLE_CASE).mechanism)
     object.__setattr__(soft, "drivers", ())
     x, y, z = AXLE["points"]["wc"]
     ends = {"l": ("up_l", (x, y, z)), "r": ("up_r", (x, -y, z))}
@@ -497,3 +499,10 @@ def test_values_below_accuracy_print_zero(tmp_path, monkeypatch, capsys):
     line = "wheel_center.z.per_lateral_force [mm/kN]  0  (from 0 to 0)"
     assert line in capsys.readouterr().out
     assert "e-24" not in Path("kc.html").read_text().partition("Compliance at design")[2]
+
+
+def test_released_joint_keeps_its_bushings(tmp_path):
+    soft = released(bushed(tmp_path, "cardan").mechanism)
+    assert [joint.name for joint in soft.joints] == ["g"]
+    assert [each.name for each in soft.forces] == ["b", "s", "h.front"]
+    assert [each.name for each in soft.drivers] == ["e"]

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.adapters.shared.poses import at_start
+from kincheck.adapters.writers.poses import at_start
 from kincheck.core import (
     Gear,
     JointAngle,

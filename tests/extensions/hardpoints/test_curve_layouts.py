@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.extensions.hardpoints.suspension import Side
+from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 
 from ...support.case_texts import refused
 from ...support.rods_of_templates import solved

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
+from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 
 from ...support.case_texts import complains, rows, write
 from .test_hardpoint_dialects import POINTS, comma, table

@@ -5,10 +5,12 @@ import shlex
 import subprocess
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import msgspec
 import numpy as np
 import pytest
+from kincheck.adapters.floors.floors import Floor
 from kincheck.core.case.case import Truth
 from kincheck.core.cli import main
 from kincheck.core.extensions.laboratory import command as command
@@ -17,7 +19,6 @@ from kincheck.core.extensions.laboratory.bench.engines import Bench
 from kincheck.core.extensions.laboratory.bench.report import precision_diagram, report
 from kincheck.core.extensions.laboratory.paper import formulation
 from kincheck.core.extras import THREADS
-from kincheck.core.harness.engine import Floor
 from kincheck.core.harness.record import Outcome
 from kincheck.core.report.sections import page
 
@@ -80,16 +81,13 @@ def test_spread_has_quartiles():
 
 @dataclass
 class Measured(Fake):
-    """With efforts, off by a micrometre or not at all, and a floor."""
+    """With efforts, off by a micrometre or not at all."""
 
     def efforts(self):
         return {
             "coarse": Fake(self.name, off("position", lambda p: p + 1e-6), mode=self.mode),
             "fine": Fake(self.name, mode=self.mode),
         }
-
-    def floor(self, case):
-        return Floor(0.5, "half a microsecond", {"all": 0.5}) if self.mode == "projection" else None
 
 
 def test_precision_entry_has_error():
@@ -167,6 +165,9 @@ def test_bench_proves_case_without_reference():
 # The whole
 
 
+HALF = Floor(0.5, "half a microsecond", {"all": 0.5})
+
+
 def measured(progress=print):
     """Of fake engines in both modes."""
     both = [
@@ -175,15 +176,18 @@ def measured(progress=print):
         Measured("fake", mode="simulate"),
         Fake("gone", installed=None),
     ]
-    return engines.measure(
-        {"crank": crank()},
-        both,
-        tol=TOL,
-        rounds=1,
-        parts=("work",),
-        command="kincheck bench",
-        progress=progress,
-    )
+    floor = SimpleNamespace(load=lambda: lambda engine, case: HALF)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(precision, "offers", lambda kind: {"native": floor, "fake": floor})
+        return engines.measure(
+            {"crank": crank()},
+            both,
+            tol=TOL,
+            rounds=1,
+            parts=("work",),
+            command="kincheck bench",
+            progress=progress,
+        )
 
 
 def test_modes_share_neither_table_nor_diagram():

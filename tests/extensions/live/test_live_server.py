@@ -19,7 +19,6 @@ import pytest
 from kincheck import KincheckError, load, run, sweep
 from kincheck import live as kincheck_live
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.extensions.live import table as live_table
 from kincheck.core.extensions.live.model import LiveModel
 from kincheck.core.extensions.live.protocol import (
@@ -33,6 +32,7 @@ from kincheck.core.extensions.live.protocol import (
     Vary,
 )
 from kincheck.core.extensions.live.table import LiveTable
+from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 

@@ -9,6 +9,7 @@ from time import sleep
 import numpy as np
 import pytest
 from kincheck.core import solve
+from kincheck.core.extensions.blocks.components import components
 from kincheck.core.extensions.designs.design_batch import solve_variants
 from kincheck.core.extensions.llvm import jit as llvm
 from kincheck.core.extensions.llvm.jit import LlvmCode
@@ -18,7 +19,6 @@ from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.structure.components import components
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import Plan, Program, Tape, program
 from kincheck.core.program.executor import compiled_at_once

@@ -15,7 +15,7 @@ from ...support.mechanisms import ORIGIN, Y
 
 pytest.importorskip("opensim", reason="OpenSim is not installed: pip install 'kincheck[simbody]'")
 
-from kincheck.adapters.shared.poses import euler_angles
+from kincheck.adapters.shared.axis_angles import euler_angles
 from kincheck.adapters.simbody.simbody import turn_parameters
 
 ENGINE = adapters.engine("simbody")

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from kincheck import adapters, cases
-from kincheck.adapters.shared.equivalents import with_joints_alone
+from kincheck.adapters.simulate.simulation import with_joints_alone
 from kincheck.core import (
     Distance,
     Gear,

@@ -13,6 +13,7 @@ from kincheck.core import CaseError, KincheckError, PointCoordinate, Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.extensions.hardpoints.suspension import Vehicle
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+from kincheck.core.extensions.notebook.tables import table_of
 from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.extensions.sweep.varied_places import Geometry
 from kincheck.core.harness.execution import Answer, Pair, attempt
@@ -247,7 +248,7 @@ def test_curves_become_tables(corner):
     )
     data = found.dataset()
     assert data.variables["toe.slopes"].unit == "rad/m"
-    columns = data.table()
+    columns = table_of(data)
     assert len(columns["toe"]) == 10
     np.testing.assert_array_equal(
         columns["toe.slopes.tierod_inner z"], found.slopes["toe"][:, :, 0].ravel()

@@ -6,9 +6,10 @@ import kincheck.cases
 import numpy as np
 from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.outputs import with_all_coordinates, with_all_motions
+from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.case.models.files import load
 from kincheck.core.case.notes import notes
+from kincheck.core.extensions.trees.outputs import with_all_motions
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Cylindrical, Polynomial, Revolute

@@ -16,7 +16,8 @@ from kincheck import adapters
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import KincheckError, MechanismError
-from kincheck.core.kinematics import NativeSolver, largest_residual, reduce_rows
+from kincheck.core.extensions.closing.reduction import reduce_rows
+from kincheck.core.kinematics import NativeSolver, largest_residual
 from scipy.spatial.transform import Rotation
 
 from ...support.by_night import sparse_by_day

@@ -14,8 +14,9 @@ import msgspec
 
 from ....case.case import Case, Truth
 from ....case.io.reference_file import series
+from ....doors import offers
 from ....errors import SolveError
-from ....harness.engine import Engine, Measurable
+from ....harness.engine import Engine
 from ....harness.native_engine import NativeEngine
 from ....harness.record import Outcome, Record
 from ....harness.run import run
@@ -94,7 +95,7 @@ class Needed(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class FloorOf(msgspec.Struct, frozen=True, kw_only=True):
-    """A simulator's floor on a case; see `Floor`."""
+    """A simulator's floor on a case, a lower bound of its time; see `adapters.floors`."""
 
     case: str
     engine: str
@@ -225,10 +226,10 @@ def floors(case: Case, engines: Iterable[Engine]) -> list[FloorOf]:
     found: list[FloorOf] = []
     for engine in engines:
         able = engine.version() is not None and not engine.unsupported(case)
-        if able and isinstance(engine, Measurable) and (floor := engine.floor(case)) is not None:
-            found.append(
-                FloorOf(case=case.name, engine=engine.name, mode=engine.mode, **asdict(floor))
-            )
+        known = offers("floors").get(engine.name) if engine.mode == "projection" else None
+        if able and known:
+            floor = asdict(known.load()(engine, case))
+            found.append(FloorOf(case=case.name, engine=engine.name, mode=engine.mode, **floor))
     return found
 
 

@@ -15,16 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import MOST_NAMED, brief, remedy, shortened
-from ...trajectory import Array
-from ..case import TIME, Case, Origin, Quantity, Truth
-from ..quantity import Convention, TypedQuantity
-from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
-from .document import fault, number_or_nan, require_known, shown
-from .reader_options import CurveOptions
-from .reference import compare_at_samples
-from .reference_file import sha256
-from .reference_samples import (
+from ...case.case import TIME, Case, Origin, Quantity, Truth
+from ...case.io.document import fault, number_or_nan, require_known, shown
+from ...case.io.reader_options import CurveOptions
+from ...case.io.reference import compare_at_samples
+from ...case.io.reference_file import sha256
+from ...case.io.reference_samples import (
     Column,
     Columns,
     Samples,
@@ -36,8 +32,12 @@ from .reference_samples import (
     require_positions,
     samples_of,
 )
-from .schema import MOST_SAMPLES
-from .table import folded, require_unit, split_head, unit_of_head
+from ...case.io.schema import MOST_SAMPLES
+from ...case.io.table import folded, require_unit, split_head, unit_of_head
+from ...case.quantity import Convention, TypedQuantity
+from ...case.units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
+from ...errors import MOST_NAMED, brief, remedy, shortened
+from ...trajectory import Array
 
 MAP = "--map"
 _WRITTEN = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")

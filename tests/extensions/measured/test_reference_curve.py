@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
-from ..support.case_texts import refused, write
-from ..support.rods_of_templates import solved
-from ..support.suspension_files import strut_of_table
+from ...support.case_texts import refused, write
+from ...support.rods_of_templates import solved
+from ...support.suspension_files import strut_of_table
 
 # Two minutes of arc: the repeatability of a rig, made up; its noise is an eighth of that.
 ATOL = 2.0 / 60.0

@@ -13,8 +13,8 @@ from typing import Any, TypeAlias, cast
 
 import numpy as np
 
-from ..errors import MechanismError, remedy
-from ..jet import Jet
+from ...errors import MechanismError, remedy
+from ...jet import Jet
 
 Function: TypeAlias = Callable[..., Any]
 Functions: TypeAlias = Mapping[str, Function]

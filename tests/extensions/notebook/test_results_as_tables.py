@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from kincheck.core.dataset import Dataset, Variable
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+from kincheck.core.extensions.notebook.tables import columns_of, table_of
 from kincheck.core.harness.scene_record import Scene, SceneBody, SceneJoint, ScenePoint
 from kincheck.core.tabular import Tabular
 
@@ -72,7 +73,7 @@ def test_result_pandas_and_xarray_equal_dataset(results, kind):
         results[kind].to_dataframe(),
         results[kind].to_xarray(),
     )
-    assert list(frame.columns) == list(data.table())
+    assert list(frame.columns) == list(table_of(data))
     assert len(frame) == np.prod([data.sizes[dim] for dim in data.rows])
     for name, each in data.variables.items():
         assert np.array_equal(
@@ -144,10 +145,10 @@ def test_trajectory_has_drive_time_and_units(results):
     assert motion.drive.units == {"turn": "rad"}
     assert np.allclose(motion.drive.times, VALUES / 2.0, rtol=1e-15, atol=0.0)
     assert repr(motion).startswith("<Trajectory: turn 0 to 1 rad, 12 samples, points end, residual")
-    table = motion.dataset().table()
+    table = table_of(motion.dataset())
     assert np.array_equal(table["position.end.y"], motion.points["end"].position[:, 1])
     assert np.array_equal(table["acceleration.end.z"], motion.points["end"].acceleration[:, 2])
-    units = {name: each.unit for name, each in motion.dataset().columns().items()}
+    units = {name: each.unit for name, each in columns_of(motion.dataset()).items()}
     assert units["turn"] == "rad"
     assert units["time"] == "s"
     assert units["velocity.end.x"] == "m/s"
@@ -182,7 +183,7 @@ def test_trajectory_has_all_drivers():
 
 def test_designs_table_rows(results):
     designs = results["Designs"]
-    table = designs.dataset().table()
+    table = table_of(designs.dataset())
     assert list(table)[:2] == ["design", "sample"]
     assert np.array_equal(table["design"], np.repeat([0, 1], 12))
     assert np.array_equal(table["turn"], np.tile(VALUES, 2))
@@ -194,7 +195,7 @@ def test_results_table_rows(results):
     assert run.record("rssr", "native") is results["Record"]
     with pytest.raises(KeyError):
         run.record("rssr", "mujoco")
-    table = run.dataset().table()
+    table = table_of(run.dataset())
     assert table["outcome"].tolist() == ["pass"]
     assert 0.0 < table["position_error_over_tolerance"][0] < 1.0
     assert run.to_dict()["schema"] == "kincheck-results/1"

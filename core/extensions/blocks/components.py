@@ -20,24 +20,26 @@ from ...algebra import Quat, Scalar, Vec3, quat
 from ...errors import SolveError
 from ...failures import FailureKind
 from ...joints import Joint
-from ...mechanism.mechanism import Mechanism, Point, Vector, extent
-from ...primitives.base import Drive
-from ..formulation.cartesian import COLUMNS, Cartesian, PrescribedBody
-from ..formulation.constraints import (
+from ...kinematics.formulation.cartesian import COLUMNS, Cartesian, PrescribedBody
+from ...kinematics.formulation.constraints import (
     Constraint,
     Frames,
     Relation,
     constraints,
-    coordinates_of,
     frames,
-    renamed,
-    structure,
     unit_near,
-    with_numbers,
 )
-from ..formulation.state_vectors import jacobian
-from .degrees_of_freedom import COORDINATES, FreedomAccount, Selection, selection_of
-from .redundancy import independent_rows
+from ...kinematics.formulation.state_vectors import jacobian
+from ...kinematics.structure.degrees_of_freedom import (
+    COORDINATES,
+    FreedomAccount,
+    Selection,
+    selection_of,
+)
+from ...kinematics.structure.redundancy import independent_rows
+from ...mechanism.mechanism import Mechanism, Point, Vector, extent
+from ...primitives.base import Drive
+from .numbers_of import coordinates_of, renamed, structure, with_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,18 +100,36 @@ class Alike:
     varied: Sequence[int]
 
     @property
+    def frame(self) -> Frames:
+        """The frame of the lengths."""
+        return Frames(self.first.unit, {}, self.first.bodies)
+
+    @property
+    def given(self) -> Sequence[str]:
+        """Bodies that are solved elsewhere."""
+        return self.first.given
+
+    @property
     def numbers(self) -> list[Scalar]:
-        """All numbers of the first section."""
+        """The varied numbers of the first section."""
+        every = self._numbers()
+        return [every[k] for k in self.varied]
+
+    def _numbers(self) -> list[Scalar]:
         found = list[Scalar]()
         structure(self.first, found)
         return found
 
     def with_numbers(self, given: Sequence[Scalar]) -> Section:
         """Return the section with other varied numbers."""
-        numbers = self.numbers
+        numbers = self._numbers()
         for k, number in zip(self.varied, given, strict=True):
             numbers[k] = number
         return with_numbers(self.first, iter(numbers))
+
+    def select(self) -> Selection:
+        """Select the rows to solve; see `select_section`."""
+        return select_section(self.first)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import JointAngle, SolveError
-from kincheck.core.kinematics.continuation.trace import trace
+from kincheck.core.extensions.trace.curve import trace
 
-from ..support.by_night import sparse_by_day
-from ..support.mechanisms import (
+from ...kinematics.test_redundancy import locomotive
+from ...kinematics.test_singular import LIMITS
+from ...support.by_night import sparse_by_day
+from ...support.mechanisms import (
     A0,
     B0,
     C0,
@@ -30,12 +32,6 @@ from ..support.mechanisms import (
     pushed,
     slider_crank,
 )
-
-# The strut's limits of travel [m] to 18 digits, by other means than the package's: the six numbers
-# of the knuckle's pose in 40 digits close two rods, the arm's axis and the strut's line (as in
-# strut_oracle.py), and a secant rule makes the stroke stationary.
-LIMITS = {1: 0.293337313746648221, -1: -0.316737084187394147}
-
 
 # Limit points
 
@@ -300,3 +296,10 @@ def test_open_curve_of_many_bodies():
     curve = trace(chain(5), "turn", length=0.4)
     assert not curve.closed
     assert curve.arc[-1] == pytest.approx(0.4)
+
+
+def test_trace_past_dead_rods():
+    """One rod in its dead point is no branch point, for the other one holds; two are."""
+    assert trace(locomotive(np.pi / 2.0), "turn", length=7.0, longest=0.1).events == ()
+    curve = trace(locomotive(np.pi), "turn", length=3.5, longest=0.1)
+    assert curve.events[0].kind == "branch point"

@@ -1,21 +1,16 @@
-"""Cases made of a case: without rows redundant but for the digits of its file, and on a path for
-derivatives by the travel of wheels.
-"""
+"""A case without rows redundant but for the digits of its file."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-
-from ..errors import MechanismError
-from ..kinematics import NativeSolver, degrees_of_freedom, largest_residual, reduce_rows
-from ..mechanism.motions import Motion, Waypoints
-from ..trajectory import Array
-from .case import TIME, Case, Closure, Sweep, size
+from ...case.case import Case, Closure
+from ...errors import MechanismError
+from ...kinematics import NativeSolver, degrees_of_freedom, largest_residual
+from .reduction import reduce_rows
 
 # Largest accepted residual of the rows that are solved, relative to the mechanism's size.
 _TOL = 1e-12
@@ -129,27 +124,3 @@ def _trial(case: Case, tolerance: float, carrying: Collection[str]) -> _Trial:
     }
     left = largest_residual(found.mechanism, joints, solved)
     return _Trial(less, tuple(carrying), found.unit, left, int(motion.solved.sum()))
-
-
-# Displacement of a driver at that rate in the time between two samples, over the mechanism's
-# size: small, so that the path between samples goes hardly beyond them.
-STEP = 1e-3
-
-
-def held_case(case: Case, drivers: Sequence[str]) -> Case:
-    """Return the case on a path through the same poses, on which these drivers alone move at each
-    sample.
-    """
-    # only ratios of rates count, and those of a path at rest are the same
-    sweep = replace(case.sweep, rate=1.0) if case.sweep.static else case.sweep
-    path = sweep.path
-    times: Array = np.unique([0.0, *path.times]) if path.covers(0.0) else np.unique(path.times)
-    shortest = float(np.diff(times).min(initial=1.0))
-    rate = STEP * size(case) / shortest
-    motions = dict[str, Motion]()
-    for name in dict.fromkeys((*path.motions, *drivers)):
-        values = path.motions[name].at(times)[0] if name in path.motions else np.zeros_like(times)
-        motions[name] = Waypoints(
-            tuple(times.tolist()), tuple(values.tolist()), rate if name in drivers else 0.0
-        )
-    return replace(case, sweep=Sweep(TIME, path.times, motions=motions))

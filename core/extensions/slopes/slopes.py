@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from .algebra import Scalar, Vec3, arc_tangent, power, root, where_larger
-from .trajectory import Array
+from ...algebra import Scalar, Vec3, arc_tangent, power, root, where_larger
+from ...trajectory import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,17 +12,17 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..case.case import TIME, Case, Series, pace
-from ..case.io.sections import sections
-from ..case.units import ANGLES, LENGTHS, SECOND, Unit
-from ..errors import shortened
-from ..trajectory import QUANTITIES, Array
-from ..unit_text import motion_word
-from .compare import Curve, as_array, curve_of, deviation
-from .engine import RECORDED, STANDARD
-from .labels import shown_text
-from .record import REFERENCE, Deviation, Deviations, Explanation, Facts, Record, Suspect
-from .table_units import table_facts
+from ...case.case import TIME, Case, Series, pace
+from ...case.io.sections import sections
+from ...case.units import ANGLES, LENGTHS, SECOND, Unit
+from ...errors import shortened
+from ...harness.compare import Curve, as_array, curve_of, deviation
+from ...harness.engine import RECORDED, STANDARD
+from ...harness.labels import shown_text
+from ...harness.record import REFERENCE, Deviation, Deviations, Explanation, Facts, Record, Suspect
+from ...harness.table_units import table_facts
+from ...trajectory import QUANTITIES, Array
+from ...unit_text import motion_word
 
 # Largest number of outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from ..case.case import Case
-    from ..harness.engine import Engine
-    from ..harness.record import Record
-    from .registry import Registry
+    from ...case.case import Case
+    from ...cli.registry import Registry
+    from ...harness.engine import Engine
+    from ...harness.record import Record
 
 SCHEMA = re.compile(rb"""(^\s*|["'])schema["']?\s*[=:]\s*["']kincheck-case/""", re.MULTILINE)
 """Mark of a TOML or JSON case file of any version: an unknown version causes a message."""
@@ -94,11 +94,11 @@ class CaseFile(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """Yield the engines' tests; an invalid file is a collection error with its message."""
-        from ..case.io.reader_options import CurveOptions
-        from ..errors import KincheckError, refuse
-        from ..harness.engine import Engine
-        from .engine_source import RUN, sources
-        from .run import Run
+        from ...case.io.reader_options import CurveOptions
+        from ...cli.engine_source import RUN, sources
+        from ...cli.run import Run
+        from ...errors import KincheckError, refuse
+        from ...harness.engine import Engine
 
         registry, problems = _registry(), list[str]()
         try:
@@ -136,11 +136,11 @@ class EngineTest(pytest.Item):
 
     def runtest(self) -> None:
         """Solve and judge."""
-        from ..harness.record import Outcome
+        from ...harness.record import Outcome
 
         record = _solve(self.case, self.engine)
         if record.outcome is Outcome.UNAVAILABLE and self.required:
-            from ..extras import how_to_install
+            from ...extras import how_to_install
 
             raise CaseFailedError(f"{record.message}: {how_to_install(record.engine)}")
         if record.outcome.bad:
@@ -167,12 +167,12 @@ def _solve(case: Case, engine: Engine) -> Record:
     """Return the record of the pair. A simulator runs in a separate process, because a crash would
     end the tests.
     """
-    from ..harness.engine import STANDARD, runs_in_process
-    from ..harness.execution import solve_in_process
-    from ..harness.resource_limits import Limits
-    from ..harness.run import run
-    from ..harness.workers.pool import in_workers
-    from .shared_options import TOL
+    from ...cli.shared_options import TOL
+    from ...harness.engine import STANDARD, runs_in_process
+    from ...harness.execution import solve_in_process
+    from ...harness.resource_limits import Limits
+    from ...harness.run import run
+    from ...harness.workers.pool import in_workers
 
     native = engine.name == STANDARD
     solver = solve_in_process if runs_in_process(engine) else in_workers(1, Limits())
@@ -188,6 +188,6 @@ def _solve(case: Case, engine: Engine) -> Record:
 
 @cache
 def _registry() -> Registry:
-    from .main import registry
+    from ...cli.main import registry
 
     return registry()

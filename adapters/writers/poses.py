@@ -20,12 +20,12 @@ import numpy as np
 
 from ...core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, angle_about, cross, quat, vec
 from ...core.joints import Coupler, Distance, Follower, Joint
-from ...core.joints.base import Kind, triad
+from ...core.joints.base import Kind
 from ...core.mechanism.body import Body, inertia_matrix
 from ...core.mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import Array, BodyMotion
-from .tree_plan import CHAINS, Link, ends_of
+from ..shared.tree_plan import CHAINS, Link, ends_of
 
 
 def rotated(q: Quat, a: Vec3) -> Vec3:
@@ -61,11 +61,6 @@ class Displacement:
         """
         turn = self.turn * about(axis, angle)
         return Displacement(turn, self.of(P) - rotated(turn, P))
-
-
-def frame_along(axis: Sequence[float], column: int) -> Array:
-    """Return a right-handed frame with the unit vector of the axis in a column, shape (3, 3)."""
-    return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
 
 
 def attitude(body: Body) -> Quat:
@@ -290,35 +285,3 @@ def _joint(joint: Joint, placed: Mapping[str, Displacement]) -> Joint:
         changes["length"] = joint.rod_length
     # without checks: axes rounded by a table stay rounded after the motion
     return joint.changed(**changes)
-
-
-Parameters = tuple[float, float, float, float]
-
-
-def orientation(move: str, axis: Vector) -> Vector:
-    """Return the angles about x, y and z, one after the other, of frames along an axis [rad].
-
-    A slider moves along x of its frames, a pin turns about z.
-    """
-    x, y, z = axis
-    match move:
-        case "slide":
-            return 0.0, atan2(-z, x), atan2(y, hypot(x, z))
-        case "hinge":
-            return atan2(-y, z), atan2(x, hypot(y, z)), 0.0
-        case _:
-            return 0.0, 0.0, 0.0
-
-
-def euler_angles(p: Sequence[float]) -> tuple[float, float, float]:
-    """Return the angles [rad] of successive rotations about the body's x, y and z axes, exact to
-    round-off at any rotation.
-
-    With half angles a, b, c the parameters of such turns give (e1 ± e3, e0 ± e2) =
-    (cos b ± sin b) (sin(a ± c), cos(a ± c)).
-    """
-    e0, e1, e2, e3 = p
-    plus, minus = (e1 + e3, e0 + e2), (e1 - e3, e0 - e2)
-    total, difference = atan2(*plus), atan2(*minus)
-    large, small = hypot(*plus), hypot(*minus)
-    return total + difference, 2.0 * atan2(large - small, large + small), total - difference

@@ -14,10 +14,10 @@ from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.notes import notes
 from kincheck.core.cli import main
 from kincheck.core.extensions.hardpoints.suspension import camber_of_front_view
+from kincheck.core.extensions.suspects.suspects import FACTORS, slips
 from kincheck.core.harness.compare import Curve
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
-from kincheck.core.harness.suspects import FACTORS, slips
 from kincheck.core.harness.verdict import digest
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.report.junit import to_junit
@@ -25,11 +25,11 @@ from kincheck.core.report.report import headline, write_report
 from kincheck.core.report.table import messages, to_markdown
 from kincheck.core.trajectory import Trajectory
 
-from ..support.case_texts import BASE, CSV, INLINE, complains, write
-from ..support.engine_faults import changed
-from ..support.engine_forces import force_case
-from ..support.fakes import Fake, crank, exact, off, record_of, run_case
-from ..support.loaded_slider_crank import loaded
+from ...support.case_texts import BASE, CSV, INLINE, complains, write
+from ...support.engine_faults import changed
+from ...support.engine_forces import force_case
+from ...support.fakes import Fake, crank, exact, off, record_of, run_case
+from ...support.loaded_slider_crank import loaded
 
 ENGINES = [Fake("native"), Fake("other"), Fake("third")]
 S = np.linspace(-1.0, 1.3, 24)
@@ -558,3 +558,12 @@ def test_equal_driven_coordinate_proves_nothing(tmp_path):
     """The slide's tip is where its driver puts it: everybody's data are the same."""
     _, results = results_of(tmp_path, THIRD_PARTY + INLINE + CITED)
     assert results.records[0].validated
+
+
+def test_slip_scales_accuracy():
+    values = np.linspace(1.0, 2.0, 9)
+    held = Curve(values, 1e-9)
+    reference = Curve(values / 1000.0 + 4e-7, half=np.full(9, 5e-7))
+    ((change, off),) = slips(held, reference, {}, offsets=False).items()
+    assert (change, off.tolerance) == ("times 1000", pytest.approx(5e-4, rel=1e-5))
+    assert slips(held, replace(reference, half=None), {}, offsets=False) == {}

@@ -11,10 +11,10 @@ from codecs import BOM_UTF8
 
 import kincheck.core
 import pytest
-from kincheck.core.cli import pytest_plugin
+from kincheck.core.extensions.pytest_plugin import plugin as pytest_plugin
 from kincheck.core.harness.record import Outcome, Record
 
-from ..support.case_texts import BASE, INLINE, edited
+from ...support.case_texts import BASE, INLINE, edited
 
 ENGINES = ("native", "mujoco", "pinocchio", "exudyn", "dart", "drake", "simbody")
 WRONG = INLINE.replace("1.4, 2.0", "1.4, 2.1")
@@ -186,7 +186,7 @@ def test_plugin_without_option_is_light(repository):
     heavy = {"numpy", "scipy", "msgspec", "rich", "kincheck.core.mechanism.mechanism"}
     light = f"import sys\ndef test_light():\n    assert not {heavy} & {{*sys.modules}}\n"
     (repository / "test_light.py").write_text(
-        light + "    assert 'kincheck.core.cli.pytest_plugin' in sys.modules\n"
+        light + "    assert 'kincheck.core.extensions.pytest_plugin.plugin' in sys.modules\n"
     )
     out, status = pytest_alone(repository, "-p", "no:hypothesispytest")
     assert status == 0, out

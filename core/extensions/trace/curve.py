@@ -14,17 +14,27 @@ import numpy as np
 from ...dataset import AXIS, Dataset, Variable
 from ...errors import SolveError, number_of
 from ...input_checks import names_of, require_kind, require_known, require_positive
+from ...kinematics.compiled.compiled_model import recent_model
+from ...kinematics.compiled.dense_equations import system_of
+from ...kinematics.compiled.request import Request
+from ...kinematics.continuation.pseudo_arclength import (
+    LONGEST,
+    MEETS,
+    NODE,
+    ArclengthWalk,
+    CurvePoint,
+    NearbyPoint,
+    root_near,
+    time_between,
+    turns_back,
+)
+from ...kinematics.continuation.singular_poses import Singularity, examine
+from ...kinematics.formulation.styles import NATIVE, require_style
+from ...kinematics.structure.degrees_of_freedom import require_driven
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, Ramp
 from ...tabular import Tabular
 from ...trajectory import Array
-from ..compiled.compiled_model import recent_model
-from ..compiled.dense_equations import System, system_of
-from ..compiled.request import Request
-from ..formulation.styles import NATIVE, require_style
-from ..structure.degrees_of_freedom import require_driven
-from .pseudo_arclength import NODE, ArclengthWalk, CurvePoint, NearbyPoint
-from .singular_poses import Singularity, examine
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +126,6 @@ SAME_POSE = 0.02
 SMALL, ROUNDS = 1e-6, 8
 
 
-# A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be
-# cheap, near enough to be drawn.
-LONGEST = 0.05
-
-
 def trace(
     mechanism: Mechanism,
     driver: str,
@@ -192,30 +197,6 @@ def trace(
     )
 
 
-def limit_ahead(
-    system: System, path: Path, state: Array, time: float, direction: int, tol: float
-) -> Event | None:
-    """Return the limit point close ahead of a pose in a direction of time, or None."""
-    walk = ArclengthWalk(system, path, tol)
-    try:
-        spot = walk.begin(state, time, direction)
-    except np.linalg.LinAlgError:
-        return None
-    for after in walk.spots_after(spot, NEARBY, LONGEST, ATTEMPTS):
-        if _turns_back(spot, after):
-            return _event(walk, walk.limit(spot, after))
-        spot = after
-    return None
-
-
-# A march that fails is left this near [units of the mechanism's size, rad] to the limit point that
-# stopped it, or it was something else.
-NEARBY = 0.5
-# Ten times the steps that such a way takes; equations whose rows are wrong would have it creep on
-# and on.
-ATTEMPTS = 100
-
-
 class _Trail:
     """The spots of a walk, and the events between them.
 
@@ -243,7 +224,7 @@ class _Trail:
             closing = self._closing_spot(before, spot)
             after = closing or spot
             self.spots.append(after)
-            if _turns_back(before, after):
+            if turns_back(before, after):
                 self.events.append(_event(self.walk, self.walk.limit(before, after)))
             if closing is not None:
                 self.length = closing.arc
@@ -301,7 +282,7 @@ class _Trail:
             least = two.sigma < min(one.sigma, three.sigma)
             if not least and not (two.sign != three.sign and two.sigma > three.sigma):
                 continue
-            found = self.walk.branch_point(one, three)
+            found = _branch_point(self.walk, one, three)
             if found is None or not first.arc <= (arc := found.arc % self.length) <= last.arc:
                 continue
             # each is seen from both sides
@@ -327,11 +308,6 @@ class _Trail:
         return [*filter(None, (before, *self.spots, after))]
 
 
-def _turns_back(before: CurvePoint, after: CurvePoint) -> bool:
-    """Return whether the driver's value is stationary between two spots; a spot counts once."""
-    return (before.dt < 0.0) != (after.dt < 0.0)
-
-
 def _event(walk: ArclengthWalk, found: NearbyPoint) -> Event:
     spot = found.spot
     singularity = examine(walk.system, spot.state, walk.sample(spot.time))
@@ -349,3 +325,36 @@ def _points(walk: ArclengthWalk, spots: Sequence[CurvePoint]) -> dict[str, Array
     zero = np.zeros((walk.system.unknowns, len(spots)))
     found = walk.system.outputs(*_stack(walk, spots), zero, zero)
     return {name: found[f"position {name}"].T for name in walk.system.tracer.request.points}
+
+
+def _branch_point(walk: ArclengthWalk, before: CurvePoint, after: CurvePoint) -> NearbyPoint | None:
+    """Return the branch point between two spots, or None.
+
+    Corrections do not converge there, but sigma falls to zero linearly on both sides: with its
+    sign changed on one side it is smooth, and its zero is interpolated. A minimum of sigma
+    other than zero has no such line.
+    """
+    centre = _least(walk, before, after.arc - before.arc)
+    nodes = walk.nodes(before, after, centre)
+    if nodes is None:
+        return None
+    offsets, spots = nodes
+    signed = np.sign(offsets) * np.array([spot.sigma for spot in spots])
+    from_left, from_right, root = (
+        root_near(offsets[kept], signed[kept]) for kept in (slice(4), slice(4, 8), slice(8))
+    )
+    if not abs(from_left - from_right) <= MEETS:
+        return None
+    return NearbyPoint(spots[3], before.arc + centre + root, time_between(offsets, spots, root))
+
+
+def _least(walk: ArclengthWalk, before: CurvePoint, length: float) -> float:
+    """Return the length to the least sigma, by golden section; 0 stands for unreached poses."""
+    part = 0.5 * (np.sqrt(5.0) - 1.0)
+    a, b = 0.0, length
+    while b - a > 0.01 * length:
+        c, d = b - part * (b - a), a + part * (b - a)
+        spots = walk.advance(before, c), walk.advance(before, d)
+        at_c, at_d = (spot.sigma if spot else 0.0 for spot in spots)
+        a, b = (a, d) if at_c < at_d else (c, b)
+    return 0.5 * (a + b)
