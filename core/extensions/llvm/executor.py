@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ...program.plan import Parts, Side
 from ...trajectory import Array
 from .jit import LlvmCode
-from .loops import MOTION, PART, SIDE, WALK
+from .loops import MOTION, SIDE
 from .plan import BYTES, LINE, address, aligned
+from .walk import PART, WALK
 
 OUT, FORGET = (MOTION.index(each) for each in ("ptr out", "i64 forget"))
 REACHED = SIDE.index("i64 reached")

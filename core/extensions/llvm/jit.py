@@ -22,9 +22,10 @@ from ...program.executor import at_once
 from ...program.plan import Plan
 from . import compiler
 from .bytecode import Bytecode, bytecode, pack, unpack
-from .loops import follow, parts, run, run_motions, settle
+from .loops import follow, run, run_motions, settle
 from .plan import PlanInMemory, rows
 from .programs import declarations, function, interpret
+from .walk import parts
 
 
 class Code:
