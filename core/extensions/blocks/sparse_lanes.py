@@ -26,6 +26,7 @@ from ...kinematics.continuation.singular_poses import SOUND, Anchor, Numbers
 from ...kinematics.continuation.walk import failure_kind
 from ...kinematics.formulation.acceptance_criteria import (
     EPSILON,
+    FALLS,
     LOW,
     Block,
     Candidate,
@@ -46,6 +47,7 @@ from ...kinematics.structure.degrees_of_freedom import (
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import before, maximum
+from ...program.numpy_executor import lagrange
 from ...trajectory import Array
 from ..llvm.machine_code import works
 from .elements import LargeSystem
@@ -57,6 +59,8 @@ POSES = 8
 # Residuals below this, some round-offs in rows of size one, are as small as they get; elsewhere an
 # iteration that gains less than a digit shows that they are.
 SETTLED, STALLS = 1e-15, 0.1
+FARTHEST = 1.2
+"""A polynomial is believed as far beyond its poses as they are apart, and a step: 8 / 7."""
 FEW = 5
 """Names listed in a message, at most."""
 # Steps of inverse iteration: each divides what is left of other directions by the square of how
@@ -178,6 +182,16 @@ def largest_size(values: Array) -> Array:
     return fold_rows(np.maximum, sizes)
 
 
+def falling(slope: Array, observed: Array) -> tuple[Array, Array]:
+    """Return the slopes known before and after neighbouring lanes, shape (blocks, lanes): what is
+    known falls by a factor a lane, as if each were attempted alone.
+    """
+    powers = FALLS ** np.arange(POSES + 1.0)
+    seen = np.maximum.accumulate(np.column_stack([slope, observed]) / powers, axis=1)
+    known = np.maximum(powers * seen, EPSILON)
+    return known[:, :-1], known[:, 1:]
+
+
 def _numbers(here: Poses) -> Numbers:
     return Numbers(here.state, np.concatenate([here.rates, here.accelerations]))
 
@@ -198,6 +212,8 @@ class SparseLanes(Lanes):
     many = POSES
     here: Poses
     rows: Rows
+    _known: tuple[Array, Array] | None = None
+    """Times and poses of the lanes before, if all were accepted."""
 
     def __init__(self, mechanism: Mechanism, request: Request) -> None:
         if not mechanism.moving:
@@ -277,7 +293,7 @@ class SparseLanes(Lanes):
 
     def begin(self) -> None:
         """See `Lanes`."""
-        self._renewed = 0
+        self._renewed, self._known = 0, None
         self.rows.begin()
 
     @property
@@ -332,7 +348,7 @@ class SparseLanes(Lanes):
 
     def restore(self, anchor: Anchor) -> None:
         """See `Lanes`."""
-        self.here, self.rows = anchor.pose
+        (self.here, self.rows), self._known = anchor.pose, None
 
     def sample_tables(self, times: Array, path: Path) -> list[Array]:
         """See `Lanes`."""
@@ -356,9 +372,23 @@ class SparseLanes(Lanes):
             )
             whole = np.broadcast_to(state, (len(state), POSES))
             taylor = self.system.stepped(whole, h * (rates + (0.5 * h) * accelerations))
-            solved = self._iterate(taylor, sample, self._limits.tol, MAX_ITERATIONS, count)
+            start = self._start(sample[0], taylor) if neighbours else taylor
+            solved = self._iterate(start, sample, self._limits.tol, MAX_ITERATIONS, count)
             self._judge(solved, sample, taylor, count, neighbours=neighbours)
         return self.worst[MARGINS, :count].copy()
+
+    def _start(self, times: Array, taylor: Array) -> Array:
+        """Return the poses on the polynomial through the lanes before, where it reaches: eight
+        samples on they need an iteration less than Taylor's. Round-off grows 1e4 times on the way;
+        an iteration takes it back.
+        """
+        if self._known is None:
+            return taylor
+        nodes, states = self._known
+        if np.abs(times - nodes[-1]).max() > FARTHEST * abs(nodes[-1] - nodes[0]):
+            return taylor
+        weights = lagrange(times, np.repeat(nodes[:, None], len(times), axis=1))
+        return self.system.stepped(states @ weights, np.zeros((self.system.unknowns, len(times))))
 
     def _iterate(
         self, state: Array, sample: Array, tol: float, most: int, count: int = 1
@@ -415,10 +445,11 @@ class SparseLanes(Lanes):
         closure, leftover = rest.closure, largest_size(rest.phi.take(rows.dropped, axis=0))
         off = previous(state - taylor, np.zeros(len(state)))
         moved = self._distance(state - previous(state, here.state))
-        slope = known_slope(here.slopes)
-        slopes = slope_between(sigmas, previous(sigmas, here.sigmas), moved)
-        least = least_slope(slope)[:, None]
-        known = maximum(previous(slopes, slope), least)
+        observed = slope_between(sigmas, previous(sigmas, here.sigmas), moved)
+        known = known_slope(here.slopes)[:, None]
+        slopes = maximum(observed, least_slope(known))
+        if neighbours:
+            known, slopes = falling(known[:, 0], observed)
         highest: Array = np.maximum.accumulate(sigmas, axis=1)
         largest, high = (maximum(each[:, None], highest) for each in (here.largest, here.high))
         sigma = fold_rows(np.minimum, sigmas)
@@ -435,7 +466,7 @@ class SparseLanes(Lanes):
             before=previous(sigma, here.sigmas.min()),
             largest=fold_rows(np.minimum, largest),
             reversal=sign - previous(sign, here.sign),
-            blocks=[Block(sigmas, previous(sigmas, here.sigmas), maximum(slopes, known))],
+            blocks=[Block(sigmas, previous(sigmas, here.sigmas), maximum(observed, known))],
         )
         self._margins = {
             name: fold_rows(np.minimum, margin.reshape(-1, POSES))
@@ -454,7 +485,7 @@ class SparseLanes(Lanes):
             motion.rates,
             motion.accelerations,
             sigmas,
-            maximum(slopes, least),
+            slopes,
             largest,
             high,
             sign,
@@ -469,7 +500,9 @@ class SparseLanes(Lanes):
         """See `Lanes`; change to better rows there, if the present ones have become much more
         singular.
         """
-        self.here = self._found.lane(lane)
+        found = self._found
+        self.here = found.lane(lane)
+        self._known = (found.sample[0], found.state) if lane == POSES - 1 else None
         crossing = self._limits.crossing > 0.0
         if (
             not crossing

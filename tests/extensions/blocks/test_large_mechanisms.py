@@ -22,9 +22,10 @@ from kincheck.core import (
     solve,
     solve_designs,
 )
-from kincheck.core.extensions.blocks.sparse_lanes import SparseLanes
+from kincheck.core.extensions.blocks.sparse_lanes import POSES, SparseLanes, falling
 from kincheck.core.extensions.blocks.sparse_lu import Blocks
 from kincheck.core.extensions.laboratory.bench.size import LEAN, pivot, ring
+from kincheck.core.kinematics.formulation.acceptance_criteria import least_slope
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.formulation.parameters import placed
@@ -380,3 +381,36 @@ def test_nan_error_bound_refuses_sample(monkeypatch):
     bounds = lambda lanes, state, *_: np.zeros(state.shape[1])  # noqa: E731
     monkeypatch.setattr(SparseLanes, "error_bounds", bounds)
     assert solve(mechanism, "push", values).solved.all()
+
+
+def test_iterations_of_even_samples_fall(monkeypatch):
+    """Behind the first lanes, the polynomial through those before leaves one iteration a sample.
+    Beyond lanes that are close together it is not used, so that nothing is attempted twice.
+    """
+    attempts = list[int]()
+
+    def counted(lanes, tables, **given):
+        attempts.append(tables[0].shape[1])
+        return attempt(lanes, tables, **given)
+
+    attempt = SparseLanes.attempt_at
+    monkeypatch.setattr(SparseLanes, "attempt_at", counted)
+    turn = np.linspace(0.0, 0.8, 4 * POSES + 1)
+    found = swept(ring(CRANKS), turn)
+    assert found.solved.all()
+    assert found.iterations[POSES + 1 :].max() <= 1
+    assert attempts == [*[POSES] * 4, 1]
+    attempts.clear()
+    uneven = np.concatenate([turn[:POSES] / 64.0, turn[1:]])
+    assert swept(ring(CRANKS), uneven).solved.all()
+    assert attempts == [POSES] * 5
+
+
+def test_slopes_of_neighbours_fall_lane_by_lane():
+    rng = np.random.default_rng(6)
+    slope, seen = rng.uniform(size=3), rng.uniform(size=(3, POSES)) ** 9
+    known, after = falling(slope, seen)
+    for k in range(POSES):
+        np.testing.assert_array_equal(known[:, k], slope)
+        slope = np.maximum(seen[:, k], least_slope(slope))
+        np.testing.assert_array_equal(after[:, k], slope)
