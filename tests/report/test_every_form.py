@@ -20,6 +20,7 @@ from kincheck.core.extensions.compliance import study
 from kincheck.core.extensions.compliance import views as compliance_views
 from kincheck.core.extensions.explain.text import print_diagnosis
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+from kincheck.core.extensions.reports.reports import print_report
 from kincheck.core.extensions.sweep import page as sweep_page
 from kincheck.core.extensions.sweep.tables import print_sweep
 from kincheck.core.harness.record import Explanation, Outcome, Suspect, to_json
@@ -267,7 +268,7 @@ def test_compare_reaches_every_form(tmp_path):
         return designs.comparison(result, result.exceeded)
 
     forms = {
-        "terminal": on_terminal(lambda result, file: sections.print_report(page(result), file)),
+        "terminal": on_terminal(lambda result, file: print_report(page(result), file)),
         "json": lambda result: as_json(designs.with_comparison(result, result.exceeded)),
         "page": lambda result: text_of_page(sections.page(page(result))),
         "csv": lambda result: str(designs.side_by_side(result)),

@@ -177,12 +177,12 @@ class BenchFormulation(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...report import sections as bench
+        from ..reports.reports import deliver
         from .paper import formulation as bench_formulation
 
         refuse(self.unwritable(*_files(bench_formulation.NAME)))
         found = bench_formulation.measure(registry.case(STRUT), self.seed, bench_formulation.STATES)
-        bench.deliver(bench_formulation.report(found), found, out=self.out, json=self.json)
+        deliver(bench_formulation.report(found), found, out=self.out, json=self.json)
         return Status.WITHIN
 
 

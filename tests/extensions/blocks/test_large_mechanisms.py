@@ -406,7 +406,7 @@ def test_iterations_of_even_samples_fall(monkeypatch):
     assert attempts == [POSES] * 5
 
 
-def test_slopes_of_neighbours_fall_lane_by_lane():
+def test_slopes_fall_lane_by_lane():
     rng = np.random.default_rng(6)
     slope, seen = rng.uniform(size=3), rng.uniform(size=(3, POSES)) ** 9
     known, after = falling(slope, seen)

@@ -570,14 +570,14 @@ def test_live_export_files(page, kind, start):
 
 
 @pytest.mark.parametrize("axle", [None, "heave"])
-def test_live_edits_compile_nothing(car, tmp_path, monkeypatch, axle):
+def test_live_edits_compile_nothing(car, tmp_path, monkeypatch, patch, axle):
     """The first answer has compiled all that an edit runs: none waits for the compiler."""
     pytest.importorskip("llvmlite")
     jit = pytest.importorskip("kincheck.core.extensions.llvm.jit")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))
     live = LiveTable(car, replace(TRAVEL, axle=axle))
     compiled = []
-    monkeypatch.setattr(jit, "load", lambda *content: compiled.append(content))
+    patch.setattr(jit, "load", lambda *content: compiled.append(content))
     points = [list(each) for each in live.positions]
     for k in range(60):
         points[5][2] += 0.01 * k

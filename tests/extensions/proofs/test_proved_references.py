@@ -190,7 +190,9 @@ def test_reference_of_unreadable_case(kincheck_main, tmp_path, capsys, made, fil
     stray = tmp_path / "gone.json"
     stray.write_bytes(msgspec.json.encode(msgspec.structs.replace(made[0], case="gone")))
     (tmp_path / "gone.toml").write_text('schema = "kincheck-case/9"\n')
-    told = f"kincheck: {stray}: case: found 'gone', expected one of the cases to be run: crank"
+    told = (
+        f"kincheck: {stray}: line 1: case: found 'gone', expected one of the cases to be run: crank"
+    )
     options = "--engine", "native", "--json", tmp_path / "out.json", "--reference", file, stray
     assert kincheck_main("run", "crank", tmp_path / "gone.toml", *options) == 2
     assert told in capsys.readouterr().err

@@ -8,6 +8,7 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.core import JointAngle, Revolute, Spherical
 from kincheck.core.case.case import Sweep
+from kincheck.core.doors import offers
 
 from ...oracles.naive import A
 from ...support.engine_motion import assert_motion, mechanism_of, rotation, solved
@@ -61,7 +62,8 @@ def test_turn_by_parent_axes():
 def test_simbody_settings_and_floor():
     case = cases.load("mcpherson_strut")
     assert ENGINE.settings["residual"].startswith("getQErr")
-    floor = ENGINE.floor(replace(case, sweep=Sweep("stroke", np.linspace(-0.02, 0.02, 5))))
+    few = replace(case, sweep=Sweep("stroke", np.linspace(-0.02, 0.02, 5)))
+    floor = offers("floors")["simbody"].load()(ENGINE, few)
     assert floor.us_per_sample > 0.0
     assert {"realizePosition", "calcG", "calcBiasForAccelerationConstraints"} <= set(floor.parts)
     assert floor.parts["calcFrameJacobian"] > 0.0  # of the wheel centre

@@ -190,16 +190,6 @@ def test_projection_predictor_is_second_order(name):
         assert worst(found)[0] < 1e-13
 
 
-@pytest.mark.parametrize("name", [name for name in adapters.ENGINES if name != "native"])
-def test_floor_sums_counted_calls(name):
-    engine = installed(name)
-    floor = engine.floor(strut())
-    assert floor.us_per_sample == pytest.approx(sum(floor.parts.values()))
-    assert floor.us_per_sample > 0.0
-    assert all(part in floor.counted for part in floor.parts)
-    assert adapters.engine(name, "simulate").floor(strut()) is None
-
-
 def test_pinocchio_subtrees_have_no_gap():
     """Else its constraintDynamics is wrong without a word: positions of this case were off by a
     millimetre.
