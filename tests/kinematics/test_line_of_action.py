@@ -43,7 +43,7 @@ def native(made, style="native"):
     ids=["moving", "at rest", "metres and more than a turn"],
 )
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-@pytest.mark.parametrize("kind", sparse_by_day(KINDS, 2))
+@pytest.mark.parametrize("kind", sparse_by_day(KINDS, 3))
 def test_forces_of_driven_joint_on_ground(kind, flipped, motion):
     made = chain([replace(KINDS[kind], flipped=flipped), HINGE], **motion)
     assert deviation(made, native(made)) < ROUND_OFF
@@ -60,7 +60,7 @@ def test_forces_of_driven_joint_between_bodies(kind, flipped, slow):
 
 @pytest.mark.parametrize("other_end", [False, True], ids=["", "driven from its other end"])
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-@pytest.mark.parametrize("name", sparse_by_day(COUPLINGS, 5))
+@pytest.mark.parametrize("name", sparse_by_day(COUPLINGS, 8))
 def test_forces_of_coupled_joints(name, flipped, other_end):
     one, other, coupling = COUPLINGS[name]
     links = [HINGE, replace(one, flipped=flipped), replace(other, flipped=not flipped)]

@@ -40,6 +40,7 @@ from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
 from kincheck.core.joints.base import AxialJoint, unit
 
+from ...support.by_night import sparse_by_day
 from ...support.engine_faults import changed
 from ...support.fakes import Fake, native_but, raising
 
@@ -64,7 +65,7 @@ def test_stress_corner_beside_small_loop():
     assert found.counts[Verdict.RIGHT] == samples
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("name", sparse_by_day(FAMILIES, 3))
 def test_stress_specimens_repeat_and_save(name, tmp_path):
     """The same numbers for the same seed, every kind of each family among them; a case file says
     all of them.
