@@ -113,7 +113,9 @@ def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case
         return case
     for each in offers("closings").values():
         return each.load()(case, closure, why, keys.carrying)
-    raise MechanismError(f"{why}: no extension leaves rows out; give all digits", "closure")
+    raise MechanismError(
+        f"{why}: no extension here leaves redundant rows out; write all digits", "closure"
+    )
 
 
 def _with_outputs(root: Section, case: Case) -> Case:

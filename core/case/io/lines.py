@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ...doors import offers
 
-# A message is made in a second.
+# Bytes: no line is sought in a longer file, so that a message takes a second at most.
 LONGEST = 4_000_000
 # Tables of a case are three levels deep, rows of numbers two more. Deeper nesting only obscures a
 # message.

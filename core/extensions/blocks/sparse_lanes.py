@@ -60,7 +60,9 @@ POSES = 8
 # iteration that gains less than a digit shows that they are.
 SETTLED, STALLS = 1e-15, 0.1
 FARTHEST = 1.2
-"""A polynomial is believed as far beyond its poses as they are apart, and a step: 8 / 7."""
+"""Largest reach of the polynomial beyond its poses, in their span: the next eight samples of an
+even sweep are 8 / 7 of it ahead.
+"""
 FEW = 5
 """Names listed in a message, at most."""
 # Steps of inverse iteration: each divides what is left of other directions by the square of how
@@ -307,6 +309,7 @@ class SparseLanes(Lanes):
 
     def set_prediction_start(self, time: float, path: Path) -> PoseFailure | None:
         """See `Lanes`."""
+        self._known = None  # of another path, perhaps
         try:
             self._stand_at(self.sample_tables(np.array([time]), path)[0])
         except SingularError:
@@ -378,9 +381,9 @@ class SparseLanes(Lanes):
         return self.worst[MARGINS, :count].copy()
 
     def _start(self, times: Array, taylor: Array) -> Array:
-        """Return the poses on the polynomial through the lanes before, where it reaches: eight
-        samples on they need an iteration less than Taylor's. Round-off grows 1e4 times on the way;
-        an iteration takes it back.
+        """Return where Newton's iteration starts: on the polynomial through the lanes before, if
+        the times are near enough, else at Taylor's poses. Up to eight samples ahead the polynomial
+        saves an iteration. It magnifies round-off 1e4 times; one iteration removes that.
         """
         if self._known is None:
             return taylor

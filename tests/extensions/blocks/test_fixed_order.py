@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("llvmlite")
+from kincheck.core.extensions.blocks import fixed_order
 from kincheck.core.extensions.blocks.fixed_order import LANES, FixedOrder
 
 EPSILON = float(np.finfo(float).eps)
@@ -60,3 +61,12 @@ def test_fixed_order_factors_are_replaced():
         found = order.solve(np.ones((13, LANES)))
         assert np.abs(scale * np.einsum("kij,jk->ik", dense, found) - 1.0).max() <= 1e-13
     assert order.odd.all()
+
+
+def test_code_is_kept_by_text(monkeypatch):
+    keys = list[str]()
+    monkeypatch.setattr(fixed_order, "load", lambda key, *_: keys.append(key))
+    fixed_order.load_loops.__wrapped__()
+    monkeypatch.setattr(fixed_order, "_factor", lambda: "; another text")
+    fixed_order.load_loops.__wrapped__()
+    assert len({*keys}) == 2
