@@ -3,12 +3,13 @@
 import json
 import random
 import re
+from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.document import Section, fault
+from kincheck.core.case.io.document import Section, fault, parse_json
 from kincheck.core.case.io.lines import join, keys_of, line_of
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
@@ -172,6 +173,18 @@ def test_key_twice_is_named_with_line(tmp_path):
     line = file.read_text().splitlines().index("rate = 2.0") + 2
     with pytest.raises(CaseError, match=f"line {line}, column"):
         load_case(file)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.dictionaries(NAMES, TREES, min_size=1, max_size=4), st.integers(0, 9))
+def test_key_of_json_twice_is_named_with_line(tree, seed):
+    rows = json.dumps(tree, indent=1).splitlines()
+    keys = [k for k, row in enumerate(rows) if re.match(r' *+".*": 0,?$', row)]
+    assume(keys)
+    k = random.Random(seed).choice(keys)
+    text = "\n".join([*rows[:k], f"{rows[k].rstrip(',')},", *rows[k:]])
+    with pytest.raises(CaseError, match=rf"JSON: line {k + 2}: the key .+ is given twice"):
+        parse_json(Path("a.json"), text)
 
 
 def test_section_is_named_with_line(tmp_path):
