@@ -299,7 +299,7 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
         head = Head(*unit_of_head(file, layout.where, text))  # with the unit of a row of units
         columns[k] = Column(head, values, printed.half(np.nan_to_num(values), alone=True))
     rows = shortened(samples.left_out, MOST_NAMED)
-    notes += [f"{file}: left out the rows without numbers: {rows}"] if rows else []
+    notes += [f"{file}: left out the rows without samples: {rows}"] if rows else []
     if not opensim:
         return Recording(file, columns, notes=notes)
     stated = _DEGREES.search(read_text(file, LARGEST_FILE, LESS))

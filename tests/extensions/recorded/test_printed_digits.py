@@ -181,6 +181,18 @@ def test_unknown_columns_are_named(recorded):
     )
 
 
+def test_lines_beside_samples_are_listed(recorded):
+    turn = GRIDS["even"]
+    lines = text_of(digits(8), turn, *closed_form(turn)).splitlines()
+    lines = ["# units: inch", "Rig, 4711", *lines, "end of test", "# signs"]
+    status, record = recorded("\n".join(lines))
+    assert status == 0
+    assert (
+        "left out the rows without samples: # units: inch, # signs, line 2 (Rig, 4711),"
+        " line 25 (end of test)"
+    ) in record["message"]
+
+
 def poses(turn, length=1.0, form=None):
     """Return a table of the rod's poses, its quaternions of another length."""
     place, _ = closed_form(turn)
