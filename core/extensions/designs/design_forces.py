@@ -134,7 +134,7 @@ def _alone(route: Route, wanted: WantedForces, geometry: Array, tol: float) -> S
 def _motion(model: Model, found: Variants, k: int) -> Trajectory:
     solved = found.solved[:, k]
     none: Mapping[str, Any] = {}
-    bodies = Motions(BodyMotion, found.kept[:, :, k].T, model.of_bodies)
+    bodies = Motions(BodyMotion, found.kept[:, :, k].T, model.motions[1])
     return Trajectory(none, solved, np.zeros(len(solved), np.int64), 0.0, bodies=bodies)
 
 

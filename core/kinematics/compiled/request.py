@@ -274,13 +274,11 @@ def row_ranges(motions: Mapping[str, int], tests: Sequence[str]) -> dict[str, sl
     return rows
 
 
-def rows_of_points(request: Request, rows: Mapping[str, slice]) -> dict[str, list[slice | None]]:
-    """Return by point the rows of position, velocity and acceleration; None for an absent one."""
-    return {name: [rows.get(f"{label} {name}") for label in QUANTITIES] for name in request.points}
-
-
-def rows_of_bodies(request: Request, rows: Mapping[str, slice]) -> dict[str, list[slice | None]]:
-    """Return by body the rows of r, p, v and a; None for an absent one.
+def rows_of_motions(
+    request: Request, rows: Mapping[str, slice]
+) -> tuple[dict[str, list[slice | None]], ...]:
+    """Return by point the rows of position, velocity and acceleration, and by body those of r, p, v
+    and a; None for an absent one.
 
     Rates of translation and of rotation stand side by side.
     """
@@ -289,7 +287,10 @@ def rows_of_bodies(request: Request, rows: Mapping[str, slice]) -> dict[str, lis
     def rows_between(first: str, last: str) -> slice | None:
         return slice(rows[first].start, rows[last].stop) if first in rows else None
 
-    return {
+    points = {
+        name: [rows.get(f"{label} {name}") for label in QUANTITIES] for name in request.points
+    }
+    return points, {
         name: [rows_between(f"{first} {name}", f"{last} {name}") for first, last in pairs]
         for name in request.bodies
     }

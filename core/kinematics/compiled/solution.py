@@ -24,8 +24,7 @@ from .request import (
     Request,
     kept_motions,
     row_ranges,
-    rows_of_bodies,
-    rows_of_points,
+    rows_of_motions,
 )
 
 _Columns = Mapping[str, Sequence[slice | None]]
@@ -45,8 +44,7 @@ class Columns:
         names = kept_motions(request, ())
         sizes = {name: 4 if name.startswith("p ") else 3 for name in names}
         self.count, self.by_vector = sum(sizes.values()), row_ranges(sizes, ())
-        self.points = rows_of_points(request, self.by_vector)
-        self.bodies = rows_of_bodies(request, self.by_vector)
+        self.points, self.bodies = rows_of_motions(request, self.by_vector)
 
 
 def solution(
