@@ -7,9 +7,10 @@ added here: turns of angles, signs of Euler parameters, and samples at rest.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,10 @@ class DesignOutputs:
         }
         wanted = [
             WantedOutput(
-                each, derivatives[name], tuple(each.facts.get(HELD_BUT, ())), slopes.get(name, 0)
+                equation_of(each),
+                derivatives[name],
+                tuple(each.facts.get(HELD_BUT, ())),
+                slopes.get(name, 0),
             )
             for name, each in outputs.items()
             if not each.forces
@@ -126,6 +130,22 @@ class DesignOutputs:
             tol, alone: see `PreparedDesigns.solve`.
         """
         return SolvedDesigns(self, geometry, tol, self.designs.solve(geometry, tol, alone=alone))
+
+
+def equation_of(output: Any) -> Any:
+    """Return an output without numbers on which its equation does not depend, so that designs share
+    programs: tolerances, and a radius beside the point that it leads to.
+    """
+    kept = dict[str, Any]()
+    for each in fields(output):
+        value = getattr(output, each.name)
+        if each.name in ("atol", "rtol", "why"):
+            kept[each.name] = type(value)()
+        elif each.name == "of_output":
+            kept[each.name] = equation_of(value)
+        elif getattr(value, "wheel_contact", None) is not None:
+            kept[each.name] = replace(value, wheel_radius=1.0)
+    return replace(output, **kept)
 
 
 @dataclass(frozen=True, eq=False)
