@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...case.case import HELD_BUT, Case, Quantity
 from ...case.measures import ForceMeasure, JointAngle, Orientation
-from ...case.quantity import ORDERS
+from ...case.quantity import ORDERS, where_moving
 from ...case.turns import Completion, over_sweep
 from ...jet import Jet
 from ...kinematics import NativeSolver, WantedOutput
@@ -34,6 +34,7 @@ TOL = 1e-12
 # Designs solved at once: enough to make the cost of the calls for their outputs negligible.
 # `solve_designs` has no outputs, and is as fast with a quarter of them.
 TOGETHER = 1024
+NO_GAPS = Jet(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +163,7 @@ class SolvedDesigns:
     tol: float
     found: Variants
     _completions: dict[str, Completion] = field(default_factory=dict[str, Completion])
+    _still: dict[int, Array | None] = field(default_factory=dict[int, Array | None])
 
     @property
     def solved(self) -> NDArray[np.bool_]:
@@ -184,9 +186,14 @@ class SolvedDesigns:
         if isinstance(output, ForceMeasure):
             assert self._forces is not None  # the case asks for them
             return self._forces.read(output.values)
-        with np.errstate(all="ignore"):  # unknown numbers are NaN, and so is all they give
-            jet = self._completed(name)(self._terms(name))
-        values = np.asarray((jet.x, jet.v, jet.a)[derivative])
+        if isinstance(output, Orientation) or output.period:
+            with np.errstate(all="ignore"):  # unknown numbers are NaN, and so is all they give
+                jet = self._completed(name)(self._terms(name))
+            values = np.asarray((jet.x, jet.v, jet.a)[derivative])
+        else:
+            (values,) = self.ready.designs.output(self.found, name, derivative)
+            if (gaps := self._gaps(name)) is not None:
+                values = values + gaps
         known = np.isfinite(values)
         return values if known.all() else np.where(known, values, np.nan)
 
@@ -237,9 +244,20 @@ class SolvedDesigns:
 
     def _completed(self, name: str) -> Completion:
         if name not in self._completions:
-            ready, resting = self.ready, self.ready.designs.resting(self.found, name)
+            ready, terms = self.ready, self._terms(name)
             mechanism, output = ready.case.mechanism, ready.outputs[name]
-            self._completions[name] = over_sweep(
-                mechanism, ready.path, output, self._terms(name), resting
-            )
+            self._completions[name] = over_sweep(mechanism, ready.path, output, terms, None)
         return self._completions[name]
+
+    def _gaps(self, name: str) -> Array | None:
+        """Return NaN at samples where an output has no value at rest, zero at others; None if there
+        are none. Many outputs have the same speeds.
+        """
+        speeds = self.ready.designs.resting(self.found, name)
+        if speeds is None:
+            return None
+        key = speeds[0].ctypes.data
+        if key not in self._still:
+            gaps = where_moving(NO_GAPS, speeds)
+            self._still[key] = None if gaps is NO_GAPS else np.asarray(gaps.x)
+        return self._still[key]

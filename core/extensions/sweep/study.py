@@ -283,8 +283,9 @@ class Ready:
         offsets = study.variation.offsets(study.seed, first, count)
         chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
         found = study.empty_chunk
-        for start in range(0, count, self.lanes):
-            part = slice(start, start + self.lanes)
+        size = -(-count // -(-count // self.lanes))  # of equal parts: one executor serves all
+        for start in range(0, count, size):
+            part = slice(start, start + size)
             found += self._part(index, first + start, offsets[:, part], chosen[part])
         return found
 
@@ -301,7 +302,9 @@ class Ready:
             index,
             count,
             summary_of(values, first),
-            (values if chosen.all() else values[:, :, chosen],) if chosen.any() else (),
+            (values if chosen.all() else np.compress(chosen, values, axis=2),)
+            if chosen.any()
+            else (),
             {
                 k: values[:, :, k - first].copy()
                 for k in study.picked.intersection(range(first, first + count))
