@@ -82,6 +82,7 @@ class Tracing:
             driver.
         rows: name of a motion or test -> its rows among those kept of a sample.
         blocks: of the rows (`Elimination.sigmas`).
+        redundant: number of redundant rows among those that forces are solved by.
     """
 
     plan: Plan
@@ -92,6 +93,7 @@ class Tracing:
     sampled: Sequence[int]
     rows: Mapping[str, slice]
     blocks: int
+    redundant: int
     selection: Selection
     frame: Frames
 
@@ -247,6 +249,7 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
         sampled,
         rows,
         tracer.blocks,
+        len(tracer.force_rows.selection.dropped) if request.forces else 0,
         tracer.selection,
         tracer.described[1],
     )
@@ -322,7 +325,7 @@ class Model(Tracing):
             return None
         from .solution import ForceTable  # most motions are without forces
 
-        return ForceTable(wanted, self.rows, self.frame.unit)
+        return ForceTable(wanted, self.rows, self.redundant)
 
     @property
     def orders(self) -> int:
