@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import importlib
+import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
@@ -34,6 +35,13 @@ def write_csv(path: Path, columns: Mapping[str, Kind], chunks: Iterable[Rows]) -
     """Write a CSV file and return the number of rows; numbers keep all digits."""
     with path.open("w", newline="", encoding="utf-8") as file:
         return put_csv(file, columns, chunks)
+
+
+def csv_text(columns: Mapping[str, Kind], chunks: Iterable[Rows], end: str = "\r\n") -> str:
+    """Return a table as the text of a CSV file."""
+    text = io.StringIO()
+    put_csv(text, columns, chunks, end)
+    return text.getvalue()
 
 
 def put_csv(

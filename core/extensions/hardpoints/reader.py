@@ -48,12 +48,7 @@ class HardpointReader(Reader):
             except OpenError as other:
                 if other is error:
                     raise
-                raise OpenError(  # one question of two
-                    file,
-                    [*error.why, *other.why],
-                    {**error.stated, **other.stated},
-                    {**error.writes, **other.writes},
-                ) from None
+                raise error.with_others(other) from None
             except CaseError:
                 pass
             raise

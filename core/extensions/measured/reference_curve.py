@@ -282,7 +282,7 @@ def _notes(
         listed = shortened([brief(shown(head)) for head in left_out], MOST_NAMED)
         notes.append(f"{file}: left out the columns {listed}")
     if rows:
-        notes.append(f"{file}: left out the rows {shortened([*rows], MOST_NAMED)}")
+        notes.append(f"{file}: left out the rows {shortened(rows, MOST_NAMED)}")
     if bare:
         listed = shortened([brief(shown(head)) for head in bare], MOST_NAMED)
         notes.append(f"{file}: without a unit, taken in SI units: {listed}")

@@ -298,13 +298,11 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     ):
         head = Head(*unit_of_head(file, layout.where, text))  # with the unit of a row of units
         columns[k] = Column(head, values, printed.half(np.nan_to_num(values), alone=True))
-    rows = shortened(samples.left_out, MOST_NAMED)
-    notes += [f"{file}: left out the rows without samples: {rows}"] if rows else []
-    if not opensim:
-        return Recording(file, columns, notes=notes)
-    stated = _DEGREES.search(read_text(file, LARGEST_FILE, LESS))
+    if rows := shortened(samples.left_out, MOST_NAMED):
+        notes.append(f"{file}: left out the rows without samples: {rows}")
+    stated = _DEGREES.search(read_text(file, LARGEST_FILE, LESS)) if opensim else None
     if stated is None:
-        return Recording(file, columns, "OpenSim", notes=notes)
+        return Recording(file, columns, "OpenSim" * opensim, notes=notes)
     angle = "deg" if stated[1].lower() == "yes" else "rad"
     note = f"{file}: angles without a unit in {angle}, as its head says"
     return Recording(file, columns, "OpenSim", angle, [note, *notes])

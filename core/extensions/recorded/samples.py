@@ -137,7 +137,7 @@ def _notes_on_columns(recording: Recording, meaning: Meaning) -> Iterator[str]:
             text = f"column {head.name} is taken in {unit}, as stated, and not in {head.unit}"
             yield f"{recording.file}: {text}"
     if meaning.unknown:
-        listed = shortened([*meaning.unknown], MOST_NAMED)
+        listed = shortened(meaning.unknown, MOST_NAMED)
         yield f"{recording.file}: columns of no known name are left out: {listed}"
     if bare:
         units = " and ".join(dict.fromkeys(bare.values()))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
 
 from rich.console import Console
 from rich.text import Text
 
-from ...case.io.table_file import Kind, Rows, put_csv
+from ...case.io.table_file import Kind, csv_text
 from ...errors import labelled, number_of, shortened
 from ...harness.labels import notes, number
 from ...report import terminal
@@ -282,7 +281,7 @@ def envelope_csv(results: SweepResults) -> str:
         for k, value in enumerate(scale_values(driver_scale, results.driver[swept])):
             found = (column[k] for column in numbers)
             rows.append([name, unit, k, value, driver_unit, *found, *partial])
-    return _csv_text(columns, rows)
+    return csv_text(dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
 
 
 def gradient_csv(results: SweepResults) -> str:
@@ -301,7 +300,7 @@ def gradient_csv(results: SweepResults) -> str:
                 *(factor * each.scale, its, factor * each.deviation, scale * effect(each), unit),
             ]
         )
-    return _csv_text(columns, rows)
+    return csv_text(dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
 
 
 def limits_csv(results: SweepResults) -> str:
@@ -319,16 +318,9 @@ def limits_csv(results: SweepResults) -> str:
         name = each.output or "all"
         shares = (each.share_of_all, each.share_of_complete)
         rows.append([name, unit, *limits, *counts, each.share, *interval, *shares, *indices])
-    return _csv_text(columns, rows)
+    return csv_text(dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
 
 
 def scale_values(scale: float, values: Iterable[float | None]) -> list[float | None]:
     """Return numbers times a factor; None stays None."""
     return [None if value is None else scale * value for value in values]
-
-
-def _csv_text(columns: Iterable[str], rows: Rows) -> str:
-    """Return a table as the text of a CSV file with plain line ends."""
-    text = io.StringIO()
-    put_csv(text, dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
-    return text.getvalue()
