@@ -27,7 +27,6 @@ from kincheck.core.joints import (
 )
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Sine
 
-from ..support.by_night import sparse_by_day
 from ..support.engine_motion import (
     ENGINES,
     IN_TREE_OR_CUT,
@@ -164,10 +163,9 @@ def train(reverse):
 
 
 @ENGINES
+@pytest.mark.by_day(4)
 @pytest.mark.parametrize(
-    "chosen",
-    sparse_by_day(product(["in", "middle", "rack"], [(), ("input",), ("middle", "guide")]), 4),
-    ids=str,
+    "chosen", [*product(["in", "middle", "rack"], [(), ("input",), ("middle", "guide")])], ids=str
 )
 def test_gears_and_rack_on_turning_carrier(chosen, engine):
     """Driven at the input, in the middle and from the rack; the carrier turns with it, which adds

@@ -28,7 +28,6 @@ from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism
 from kincheck.core.mechanism.motions import JointAngle
 
-from ..support.by_night import sparse_by_day
 from ..support.driven_chains import (
     COUPLINGS,
     Link,
@@ -361,7 +360,8 @@ for name, (one, other, coupling) in COUPLINGS.items():
 
 
 @pytest.mark.parametrize("engine", AGREE)
-@pytest.mark.parametrize("name", sparse_by_day(CHAINS, 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("name", CHAINS)
 def test_driver_efforts_equal_free_bodies(name, engine):
     made = CHAINS[name]
     sweep = Sweep(TIME, made.path.times, motions=made.path.motions)
@@ -376,6 +376,7 @@ def test_driver_efforts_equal_free_bodies(name, engine):
 SEEDS = (0, 1, 9, 21, 24, 27, 32, 37, 45, 63)
 
 
+@pytest.mark.by_day(2)
 @OF_ENGINES
 @pytest.mark.parametrize("seed", SEEDS)
 def test_forces_of_random_mechanisms_equal_native(seed, engine):

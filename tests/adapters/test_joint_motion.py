@@ -19,7 +19,6 @@ from kincheck.core.joints import (
 )
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
 
-from ..support.by_night import sparse_by_day
 from ..support.engine_motion import (
     BOTH_ORDERS,
     ENGINES,
@@ -99,7 +98,8 @@ def on_screw(theta, axis, point, lead, rate):
 
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
-@pytest.mark.parametrize("lead", sparse_by_day([0.05, -9.0], 2, 1))
+@pytest.mark.by_day(2)
+@pytest.mark.parametrize("lead", [0.05, -9.0])
 @pytest.mark.parametrize("driver", [JointAngle, JointDisplacement, PointCoordinate])
 def test_screw_over_turns_is_helix(driver, lead, mirrored, engine, closing):
     """By either of its coordinates or a point, with a lead above and below one radian a metre."""

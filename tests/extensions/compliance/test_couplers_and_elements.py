@@ -18,7 +18,6 @@ from kincheck.core.doors import offers
 from kincheck.core.joints import Coupler
 from kincheck.core.mechanism.loads import ELEMENTS
 
-from ...support.by_night import sparse_by_day
 from ...support.engine_motion import SIMULATORS, installed
 from ...support.one_freedom import (
     ARM,
@@ -111,7 +110,8 @@ def test_equilibrium_equals_root(engine, name, tmp_path):
     assert record.outputs["tip.z"].position == pytest.approx([height], abs=1e-13)
 
 
-@pytest.mark.parametrize("name", sparse_by_day(SUBJECTS, 12))
+@pytest.mark.by_day(12)
+@pytest.mark.parametrize("name", SUBJECTS)
 def test_free_motion_equals_integration(name, tmp_path):
     times = np.linspace(0.0, 0.5, 6)
     free = {"duration": 0.5, "samples": 6, "rates": {"pin": RATE}}
@@ -166,6 +166,7 @@ def test_kc_passes_in_engines(engine, name, tmp_path):
     assert record.outcome.value == "pass", record.message
 
 
+@pytest.mark.by_day(3)
 @EVERY
 def test_sweep_of_designs_equals_closed_form(name, tmp_path, capsys):
     """The tip is 5 mm higher in half of the variants; a number of the element varies if it can."""

@@ -422,6 +422,7 @@ script | % the car | {corner}.{name} = [{x} {y} {z}];
 WORDS = {"F": "Front", "R": "Rear"}, {"L": "Left", "R": "Right"}
 
 
+@pytest.mark.by_day(4)
 @pytest.mark.parametrize("corner", CORNERS)
 @pytest.mark.parametrize(("head", "form"), rows(TABLES))
 def test_corner_of_car_table_is_read(tmp_path, head, form, corner):
