@@ -111,6 +111,7 @@ def test_planetary_gear_turns_exactly(ratio, engine):
     assert_motion(solved(engine, mechanism, TURNS).points["tip"], expected)
 
 
+@pytest.mark.by_day(3)
 @IN_TREE_OR_CUT
 @pytest.mark.parametrize("bodies", [("spindle", "nut"), ("nut", "spindle")])
 def test_screw_in_loop_moves_as_native(bodies, engine, closing):
@@ -299,6 +300,7 @@ def differential(folder):
     return load_case(file)
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("engine", ["native", *SIMULATORS])
 def test_linear_coupler_of_three_joints_passes(engine, tmp_path):
     case = differential(tmp_path)

@@ -140,6 +140,7 @@ def in_loops(engines, kinds, orders):
     return found
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(("kind", "bodies", "engine"), in_loops(ENGINES, TYPES, ["AB", "BA"]))
 def test_joint_reactions_equal_native(kind, bodies, engine):
     _, solution = assert_as_native(engine, joint_case, kind, bodies)
@@ -227,6 +228,7 @@ def built_in_case(name):
     return sweep_case(loaded(case.mechanism), replace(case.sweep, values=few))
 
 
+@pytest.mark.by_day(3)
 @OF_ENGINES
 @pytest.mark.parametrize("name", ["four_bar", "bennett", "mcpherson_strut"])
 def test_undetermined_reactions_equal_native(name, engine):

@@ -66,6 +66,7 @@ def all_loops():
     return found
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(("engine", "kind", "bodies", "closing"), all_loops())
 def test_joint_in_loop_moves_as_native(engine, kind, bodies, closing):
     mechanism = on_crank(kind, *bodies)
@@ -173,6 +174,7 @@ def test_driven_joint_closes_loop(mirrored, engine):
     )
 
 
+@pytest.mark.by_day(3)
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("bend", [0.0, 0.6, 1.5])
@@ -197,6 +199,7 @@ def test_constant_velocity_joint_over_turns(bend, mirrored, engine, closing):
         assert ("joint" in found.details["closures"]) == closing
 
 
+@pytest.mark.by_day(3)
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("rounding", [0.0, 8e-3])

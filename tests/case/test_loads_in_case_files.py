@@ -309,6 +309,7 @@ def test_rounded_axis_gives_true_forces(tmp_path, rounding):
     within(found, digits)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     "more",
     [
@@ -368,6 +369,7 @@ def test_sprung_hinge_keeps_its_rows(tmp_path):
         within(found, 1e-6)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     "more",
     [{}, {"order": "dbca"}, {"cross": (0.6, 0.0, 0.8)}, {"twin": (0.6, 0.2, 1e-6)}],

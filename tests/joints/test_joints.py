@@ -165,6 +165,7 @@ def threaded(example):
     return len(getattr(example.joint, "relations", ()))
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", TYPES)
 def test_joint_rows_span_paper_rows(name, seed):
@@ -220,6 +221,7 @@ def test_joint_freedoms_complement_rows(name):
     )
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", [name for name in TYPES if Joint.registry[name].symmetric])
 def test_joint_rows_with_reversed_bodies(name):
     """A joint forbids the same with its bodies exchanged, unless its geometry belongs to one of

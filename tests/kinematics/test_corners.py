@@ -65,6 +65,7 @@ def latin(rows, columns, others):
     ]
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     ("beside", "count", "loops"),
     latin([1e-2, 1e-3, -1e-4, 1e-5, -3e-6], [2, 3, 8, 400], [1, 2]),
@@ -270,6 +271,7 @@ def test_nearly_singular_kite_exchanges_rows(ends, beside, style):
 
 
 # every count with the native style and another one
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     ("count", "style"),
     [

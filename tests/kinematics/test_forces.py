@@ -38,6 +38,7 @@ EQUILIBRIUM = [
 ]
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", EQUILIBRIUM)
 def test_reactions_hold_bodies_in_equilibrium(name):
     """Newton and Euler, body by body: no row of the formulation is asked."""
@@ -70,6 +71,7 @@ def test_forces_of_named_members_only():
 # Determinacy: forces.md of the study gives the same numbers
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("name", "joint", "expected"),
     [
@@ -181,6 +183,7 @@ def few(case, samples=7):
     return Path(path.motions, path.times[::step], path.design)
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize(
     "name", ["mcpherson_strut", "four_bar", "bricard", "planar_slider_crank", "rssr"]
@@ -192,6 +195,7 @@ def test_traced_forces_equal_svd_forces(name, compiled):
     assert_traced(loaded(case.mechanism), few(case), compiled=compiled)
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("style", styles()[1:])
 @pytest.mark.parametrize("name", ["mcpherson_strut", "four_bar"])
 def test_traced_forces_in_row_styles(style, name):

@@ -143,6 +143,7 @@ WAYS = [
 ]
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("solved", "angles"),
     [
@@ -163,6 +164,7 @@ def test_pinion_rolls_from_any_angle(solved, angles):
         assert "notes" not in found.details
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("solved", WAYS)
 @pytest.mark.parametrize("kind", ["sine", "typed table"])
 def test_typed_digits_start_at_design(solved, kind):
@@ -184,6 +186,7 @@ def test_typed_digits_start_at_design(solved, kind):
     )
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("solved", WAYS)
 def test_relative_drivers_with_typed_phase(solved):
     """The sine of pi is 1e-16 and that of 3.14159 is 3e-6, and both are none to who types them."""
@@ -272,6 +275,7 @@ FAR = 1.0
 """By what the arm at time zero is ahead of its design [rad]."""
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("solved", WAYS)
 def test_ambiguous_start_is_noted(solved):
     mechanism = arm(60.0)
@@ -306,6 +310,7 @@ def test_equal_starts_are_not_ambiguous():
     assert "go straight from it to time zero (u = 1.68" in note
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("solved", WAYS)
 def test_start_with_one_reachable_way(solved):
     """Straight to time zero, the tip would go through the hinge, where links of different lengths

@@ -67,7 +67,6 @@ def errors(row):
     return [run["error"] for run in row["runs"]]
 
 
-@pytest.mark.nightly
 def test_mujoco_runge_kutta_is_second_order(rows):
     # four-bar of the study: 7.8e-6, 1.9e-6, 4.5e-7
     row = rows["mujoco", "RK4", "best"]

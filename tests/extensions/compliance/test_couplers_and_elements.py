@@ -86,6 +86,7 @@ def checked(records, engine):
     return record
 
 
+@pytest.mark.by_day(3)
 @EVERY
 @pytest.mark.parametrize("engine", ENGINES)
 def test_run_equals_closed_form(engine, name, tmp_path):
@@ -98,6 +99,7 @@ def test_run_equals_closed_form(engine, name, tmp_path):
             assert found == pytest.approx(values, rel=1e-10, abs=1e-11), output
 
 
+@pytest.mark.by_day(3)
 @EVERY
 @pytest.mark.parametrize("engine", ENGINES)
 def test_equilibrium_equals_root(engine, name, tmp_path):
@@ -135,6 +137,7 @@ def lifted(tmp_path, subject):
     )
 
 
+@pytest.mark.by_day(3)
 @EVERY
 def test_kc_equals_virtual_work(name, tmp_path):
     """The load F of the wheel has F dz = (V' - Q) dq."""
@@ -194,6 +197,7 @@ def test_sweep_of_designs_equals_closed_form(name, tmp_path, capsys):
             assert found[output][key] == pytest.approx(choose(values, axis=0), rel=1e-9, abs=1e-11)
 
 
+@pytest.mark.by_day(3)
 @EVERY
 def test_reference_is_proved_or_refused(name, tmp_path, capsys):
     subject = SUBJECTS[name]
@@ -212,6 +216,7 @@ def test_reference_is_proved_or_refused(name, tmp_path, capsys):
             assert proved == pytest.approx(values, rel=1e-13, abs=1e-14), (output, quantity)
 
 
+@pytest.mark.by_day(3)
 @EVERY
 @pytest.mark.parametrize("to", offers("writers"))
 def test_export_holds_or_names_it(to, name, tmp_path, capsys):
@@ -234,6 +239,7 @@ def test_export_holds_or_names_it(to, name, tmp_path, capsys):
         assert "x" in text
 
 
+@pytest.mark.by_day(3)
 @EVERY
 @pytest.mark.parametrize(
     "to", ["osim", *(pytest.param(each, marks=pytest.mark.nightly) for each in TREES)]

@@ -302,6 +302,7 @@ def carried(case, again):
     return motions
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", sorted(Joint.registry))
 def test_urdf_loop_read_again_moves_alike(name, tmp_path):
     """The joint closes a loop: the conditions beside the URDF tell its freedoms."""

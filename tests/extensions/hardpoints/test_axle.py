@@ -125,6 +125,7 @@ def assert_close(found, sample, true, atol):
     assert values == pytest.approx(true, abs=atol, rel=1e-11)
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("motion", ["heave", "roll", "steer"])
 @pytest.mark.parametrize("name", RODS)
 def test_axle_outputs_in_closed_form(tmp_path, name, motion):
@@ -366,6 +367,7 @@ def of(name, **own):
     return replace(SAID, template=name, **{**steered, **own})
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_right_wheel_outputs_mirror_left(tmp_path, name):
     """The rack moves to the other side for the mirror image."""

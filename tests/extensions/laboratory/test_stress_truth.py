@@ -93,6 +93,7 @@ def test_truth_curve_rates_and_accelerations(name):
         np.testing.assert_allclose(a.astype(float), found.points[point].acceleration, atol=1e-11)
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     "name",
     [

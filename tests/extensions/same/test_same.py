@@ -70,6 +70,7 @@ SAME = {
 }
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(("text", "lost"), SAME.values(), ids=SAME)
 def test_same_motion_names_lost_facts(text, lost, tmp_path):
     found = against(tmp_path, text)
@@ -98,6 +99,7 @@ DIFFERENT = {
 }
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(("text", "reason"), DIFFERENT.values(), ids=DIFFERENT)
 def test_different_motion_names_joint_and_place(text, reason, tmp_path):
     found = against(tmp_path, text)

@@ -201,6 +201,7 @@ COARSE = 0.25
 """Longest step of closed curves: the coarser the walk, the harder are its ends."""
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("centre", "direction", "past"),
     [

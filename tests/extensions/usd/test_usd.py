@@ -90,6 +90,7 @@ NESTED = (
 )
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("prims", "units"),
     [
