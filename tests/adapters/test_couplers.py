@@ -111,7 +111,6 @@ def test_planetary_gear_turns_exactly(ratio, engine):
     assert_motion(solved(engine, mechanism, TURNS).points["tip"], expected)
 
 
-@pytest.mark.by_day(3)
 @IN_TREE_OR_CUT
 @pytest.mark.parametrize("bodies", [("spindle", "nut"), ("nut", "spindle")])
 def test_screw_in_loop_moves_as_native(bodies, engine, closing):
@@ -164,7 +163,6 @@ def train(reverse):
 
 
 @ENGINES
-@pytest.mark.by_day(4)
 @pytest.mark.parametrize(
     "chosen", [*product(["in", "middle", "rack"], [(), ("input",), ("middle", "guide")])], ids=str
 )

@@ -228,7 +228,6 @@ def built_in_case(name):
     return sweep_case(loaded(case.mechanism), replace(case.sweep, values=few))
 
 
-@pytest.mark.by_day(3)
 @OF_ENGINES
 @pytest.mark.parametrize("name", ["four_bar", "bennett", "mcpherson_strut"])
 def test_undetermined_reactions_equal_native(name, engine):

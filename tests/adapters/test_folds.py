@@ -25,7 +25,6 @@ from ..support.engine_motion import SIMULATORS, installed, rotation
 BEYOND = Path(__file__).parents[1] / "data" / "beyond_a_fold.toml"
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", ["native", *SIMULATORS])
 def test_fold_after_sample_ends_motion(name):
     """The rates beside the fold are so large that they seem to lead to another assembly."""

@@ -125,7 +125,6 @@ def test_unreachable_rates_at_first_sample():
     assert "its drivers cannot move there" in found.message
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("defect", [1e-4, 1e-9])
 @pytest.mark.parametrize("loops", [1, 2])
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])

@@ -26,7 +26,6 @@ def four_bar(folder, tolerance=None, axes=TILTED, **more):
     return written(folder, axes, sweep=SWEEP, outputs=ONE_OUTPUT, **more)
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("last", ["revolute", "spherical", "cylindrical", "universal"])
 @pytest.mark.parametrize("angles", [(0, 0, 0), (0.3, 1.1, -0.7)], ids=["level", "turned"])
 def test_closure_tolerance_moves_like_ideal_loop(tmp_path, last, angles):

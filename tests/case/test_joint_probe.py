@@ -52,7 +52,6 @@ def test_probe_is_well_conditioned(name):
     assert not case.reference
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", JOINTS)
 def test_probe_moves_every_freedom(name):
     """Of shifts and turns along f, g, h at the joint's point, as many move as the joint has

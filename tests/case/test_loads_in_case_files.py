@@ -369,7 +369,6 @@ def test_sprung_hinge_keeps_its_rows(tmp_path):
         within(found, 1e-6)
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     "more",
     [{}, {"order": "dbca"}, {"cross": (0.6, 0.0, 0.8)}, {"twin": (0.6, 0.2, 1e-6)}],

@@ -143,7 +143,6 @@ PLANTED = {
 }
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("what", PLANTED)
 def test_planted_regressions_are_reported(path, what):
     changes, kind, message = PLANTED[what]

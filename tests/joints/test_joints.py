@@ -221,7 +221,6 @@ def test_joint_freedoms_complement_rows(name):
     )
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", [name for name in TYPES if Joint.registry[name].symmetric])
 def test_joint_rows_with_reversed_bodies(name):
     """A joint forbids the same with its bodies exchanged, unless its geometry belongs to one of

@@ -95,7 +95,6 @@ def case(request):
     )
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("style", styles())
 def test_planar_turn_in_row_styles(case, style):
     found = solve(case.mechanism, "turn", TURNS, rate=RATE, style=style)

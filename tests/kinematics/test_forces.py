@@ -71,7 +71,6 @@ def test_forces_of_named_members_only():
 # Determinacy: forces.md of the study gives the same numbers
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("name", "joint", "expected"),
     [
@@ -183,7 +182,6 @@ def few(case, samples=7):
     return Path(path.motions, path.times[::step], path.design)
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize(
     "name", ["mcpherson_strut", "four_bar", "bricard", "planar_slider_crank", "rssr"]

@@ -91,7 +91,6 @@ def test_reversed_driven_joint_changes_sign():
     assert np.abs(back.velocity + forward.velocity).max() <= 1e-15
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     "name",
     ["andrews_squeezer", "bricard", "four_bar", "mcpherson_strut", "planar_slider_crank", "rssr"],

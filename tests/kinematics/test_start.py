@@ -143,7 +143,6 @@ WAYS = [
 ]
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("solved", "angles"),
     [
@@ -186,7 +185,6 @@ def test_typed_digits_start_at_design(solved, kind):
     )
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("solved", WAYS)
 def test_relative_drivers_with_typed_phase(solved):
     """The sine of pi is 1e-16 and that of 3.14159 is 3e-6, and both are none to who types them."""

@@ -46,7 +46,6 @@ def eliminate(values, literals, right, solve=Elimination.solve):
     return block[n * (n + 1) : -1].T, block[-1], elimination
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("transposed", [False, True])
 @pytest.mark.parametrize("density", [0.15, 0.4, 1.0])
 @pytest.mark.parametrize("literal", [0.0, 0.5, 1.0])

@@ -77,7 +77,6 @@ def test_assembly_from_errors_below_radian(angle, shift):
     assert found_from(mcpherson(), angle, shift) == (1.0, 1.0, 0.0)
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("angle", "shift", "closed", "share"),
     [

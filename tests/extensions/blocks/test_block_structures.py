@@ -54,7 +54,6 @@ def test_blocks_match_one_program(name, method):
     assert_alike(*with_one_program(method, case.mechanism, case.sweep.path, case.points))
 
 
-@pytest.mark.by_day(2)
 @IN_BLOCKS
 @pytest.mark.parametrize(
     "times",

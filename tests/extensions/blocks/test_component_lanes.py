@@ -242,7 +242,6 @@ def test_components_without_outputs():
 
 
 @pytest.mark.parametrize("lanes", [8, 16])
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("part", [1, 2, 7, 8, 9, 14, 15, 16, 17, 30, 31, 39])
 def test_step_division_by_any_lanes(part, lanes):
     """Lanes are fewer than the parts of a step: those take turns, and no part counts whose half is

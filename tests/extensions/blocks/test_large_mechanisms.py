@@ -70,7 +70,6 @@ SHAPES = {"plain": (0.5, 1.5, 1.3, 1.2), "kite": KITE, "aside": (1.0, 1.2, 1.000
 """Lengths of crank, ground, rod and rocker."""
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("count", "shape", "ends"),
     [

@@ -86,7 +86,6 @@ def checked(records, engine):
     return record
 
 
-@pytest.mark.by_day(3)
 @EVERY
 @pytest.mark.parametrize("engine", ENGINES)
 def test_run_equals_closed_form(engine, name, tmp_path):
@@ -197,7 +196,6 @@ def test_sweep_of_designs_equals_closed_form(name, tmp_path, capsys):
             assert found[output][key] == pytest.approx(choose(values, axis=0), rel=1e-9, abs=1e-11)
 
 
-@pytest.mark.by_day(3)
 @EVERY
 def test_reference_is_proved_or_refused(name, tmp_path, capsys):
     subject = SUBJECTS[name]

@@ -104,7 +104,6 @@ def test_equilibrium_of_loaded_arm(name, element, load, moment):
         assert math.atan2(y, x) == pytest.approx(balance(moment, force), abs=1e-13)
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", SIMULATORS)
 def test_equilibrium_beyond_snap_through(name):
     """Beyond the limit load plain Newton lands at the far side, its residual zero."""

@@ -217,7 +217,6 @@ def test_polynomial_coupler_shifted_to_start():
 JOINTS = [each.name for each in probes()]
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("which", [*product(JOINTS, ["mjcf", "urdf", "sdf", "osim"])], ids="-".join)
 def test_written_joint_closes_loop(which, tmp_path):
     """As it carries a body elsewhere."""

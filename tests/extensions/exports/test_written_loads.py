@@ -416,7 +416,6 @@ def pose(to, case, values, folder, start=None):
     return read(to, texts, case.mechanism, folder, values).bodies["arm"]
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("carried", [False, True], ids=["on ground", "on a moving body"])
 @pytest.mark.parametrize("swapped", [False, True], ids=["second", "first"])
 @pytest.mark.parametrize("kind", JOINTS)

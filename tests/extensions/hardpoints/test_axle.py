@@ -367,7 +367,6 @@ def of(name, **own):
     return replace(SAID, template=name, **{**steered, **own})
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_right_wheel_outputs_mirror_left(tmp_path, name):
     """The rack moves to the other side for the mirror image."""

@@ -88,7 +88,6 @@ def test_torsion_bar_twists_with_lower_arm(tmp_path, template):
         assert found[k] == pytest.approx(true, abs=CLOSE)
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("template", TEMPLATES)
 def test_anti_roll_bar_on_every_template(tmp_path, template):
     """Its link is on the part that the template says: the wheel still moves as without it."""

@@ -45,7 +45,6 @@ def expected(name, at, travel):
     return values
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("axes", ["forward,left,up", "forward,right,up"])
 @pytest.mark.parametrize("name", ["double_wishbone", "mcpherson", "five_link"])
 def test_instant_centers_equal_drawn(tmp_path, name, axes):

@@ -150,7 +150,6 @@ FAULTS = {
 }
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("kind", FAULTS)
 def test_faulty_workbook_is_refused(tmp_path, kind):
     sheets, fragments = FAULTS[kind]

@@ -108,7 +108,6 @@ def test_socket_without_token_is_refused(served, case):
         pass
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     "text",
     [

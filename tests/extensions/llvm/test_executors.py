@@ -47,7 +47,6 @@ SWEEPS = {
 }
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("compiled", COMPILED)
 @pytest.mark.parametrize(
     ("sweep", "order"), [(name, (0, 2)[k % 2]) for k, name in enumerate(SWEEPS)]

@@ -102,7 +102,6 @@ def test_extrapolated_lanes_need_one_iteration(order):
     assert errors(by_rates.points["wheel"], [found.points["wheel"].position[::8]])[0] <= 4e-16
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("interpreted", [False, True])
 @pytest.mark.parametrize("order", [0, 2])
 @pytest.mark.parametrize("lanes", [2, 4, 8])
@@ -160,7 +159,6 @@ GRIDS = {
 }
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.usefixtures("eight_lanes")
 @pytest.mark.parametrize("values", GRIDS.values(), ids=GRIDS)
 @pytest.mark.parametrize("order", [0, 2])

@@ -177,7 +177,6 @@ WAYS = {
 TIE_ROD = np.array([1.115, 0.665, 0.118])
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("width", [2, 4])
 @pytest.mark.parametrize("way", WAYS)
 def test_vector_widths_give_equal_results(way, width, monkeypatch):

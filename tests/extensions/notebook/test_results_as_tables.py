@@ -64,7 +64,6 @@ def test_result_has_repr_and_html(results, kind):
     json.dumps(found.to_dict(), allow_nan=False)
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_result_pandas_and_xarray_equal_dataset(results, kind):
     pytest.importorskip("pandas")

@@ -122,7 +122,6 @@ def test_proof_of_spline_coupler_is_refused():
         proved(case.mechanism, case.sweep.driver, case.sweep.change[:1])
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("case", PROVED, ids=lambda case: case.name)
 def test_enclosure_of_every_joint_type(case):
     """Velocities and accelerations here come from the residuals alone; the native ones from rows,

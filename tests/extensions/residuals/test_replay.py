@@ -135,7 +135,6 @@ BLIND = {
 WRONG = [(name, what) for name, case in CASES.items() for what, _ in wrong_joints(case)]
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize(("name", "what"), WRONG)
 def test_replay_finds_wrong_adams_joint(name, what):
     found = worst(name, dict(wrong_joints(CASES[name]))[what])

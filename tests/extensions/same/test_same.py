@@ -99,7 +99,6 @@ DIFFERENT = {
 }
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize(("text", "reason"), DIFFERENT.values(), ids=DIFFERENT)
 def test_different_motion_names_joint_and_place(text, reason, tmp_path):
     found = against(tmp_path, text)

@@ -128,7 +128,6 @@ CHANGES = {
 }
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize(("old", "new", "text"), CHANGES.values(), ids=CHANGES)
 def test_tendons_and_balls_are_compared(old, new, text, tmp_path):
     assert TENDONS.count(old) == 1

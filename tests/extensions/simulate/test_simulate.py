@@ -70,7 +70,6 @@ STRUT = {
 }
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", adapters.SIMULATIONS)
 def test_simulated_strut_errors_within_limits(name):
     engine = installed(name, "simulate")
@@ -102,7 +101,6 @@ def test_loads_leave_simulated_motion_unchanged(name):
             assert (here is None and there is None) or np.array_equal(here, there, equal_nan=True)
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", [name for name in adapters.SIMULATIONS if name != "exudyn-alpha"])
 def test_simulation_out_of_reach_ends(name):
     case = strut()
@@ -177,7 +175,6 @@ def coarse_strut(every):
     return replace(case, sweep=replace(case.sweep, values=few), reference=reference)
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", adapters.ENGINES)
 def test_projection_predictor_is_second_order(name):
     engine = installed(name)

@@ -100,7 +100,6 @@ LOOPS = {
 }
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS)
 def test_gazebo_or_drake_loop_closes(loop, tmp_path):
     case = read_inside(tmp_path, loop)

@@ -57,7 +57,6 @@ ORIENTATIONS = {
 }
 
 
-@pytest.mark.by_day(3)
 @pytest.mark.parametrize("angle", ["degree", "radian"])
 @pytest.mark.parametrize("sequence", ["xyz", "zyx", "XYZ", "zXy"])
 @pytest.mark.parametrize("orientation", ORIENTATIONS.values(), ids=ORIENTATIONS)

@@ -90,7 +90,6 @@ NESTED = (
 )
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("prims", "units"),
     [
