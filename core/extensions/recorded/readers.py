@@ -296,8 +296,12 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     for k, values, printed, text in zip(
         chosen, samples.numbers.T, samples.printed, samples.columns, strict=True
     ):
-        head = Head(*unit_of_head(file, layout.where, text))  # with the unit of a row of units
-        columns[k] = Column(head, values, printed.half(np.nan_to_num(values), alone=True))
+        columns[k] = Column(
+            # the text has the unit of a row of units
+            Head(*unit_of_head(file, layout.where, text)),
+            values,
+            printed.half(np.nan_to_num(values), alone=True),
+        )
     if rows := shortened(samples.left_out, MOST_NAMED):
         notes.append(f"{file}: left out the rows without samples: {rows}")
     stated = _DEGREES.search(read_text(file, LARGEST_FILE, LESS)) if opensim else None
