@@ -26,6 +26,7 @@ CLOSING = Supplied(
 QUANTITIES = ("position", "velocity", "acceleration")
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", cases.names())
 def test_built_in_case_round_trip(name, tmp_path):
     """Their references too, whose rows are exact."""

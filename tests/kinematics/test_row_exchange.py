@@ -140,6 +140,7 @@ def test_conditioning_at_dependent_rows():
     assert len({tuple(pose.owners) for pose in found.poses}) > 1
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("style", "off"),
     [
