@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from kincheck.adapters import engine
 from kincheck.core import CaseError, KincheckError, PointCoordinate, Supplied
+from kincheck.core.case.case import HELD_BUT
 from kincheck.core.case.models.files import load
 from kincheck.core.extensions.hardpoints.suspension import Vehicle
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
@@ -102,6 +103,9 @@ AXLES = [
 ]
 
 
+CORNERS = [(name, None) for name in TEMPLATES]
+
+
 @pytest.mark.parametrize("axle", sparse_by_day(AXLES, 4, 1), ids=str)
 def test_curves_of_asymmetric_axle_equal_run(tmp_path, axle):
     """Every place of the case moves by itself, so that left and right differ."""
@@ -175,9 +179,7 @@ def proved(case, variable, axis, move):
 FINE = 2.0**40
 """Places that move are multiples of one over this: with a step of 2^-27 they have 53 binary digits.
 """
-WHOLE = {
-    f"{name} {axle or 'corner'}": (name, axle) for name in TEMPLATES for axle in (None, "heave")
-}
+WHOLE = {f"{name} {motion or 'corner'}": (name, motion) for name, motion in [*CORNERS, *AXLES]}
 
 
 @pytest.mark.parametrize("key", sparse_by_day(WHOLE, 11))
@@ -201,6 +203,8 @@ def test_slopes_equal_differences_of_proved_digits(tmp_path, key):
         place: (np.round(np.array(known[place]) * FINE) / FINE).tolist() for place in variable.moves
     }
     case = replace(case, mechanism=placed(case.mechanism, grid))
+    if axle in ("roll", "steer"):  # of wheels whose travel is not that of the sweep
+        case = replace(case, outputs=[x for x in case.outputs if HELD_BUT not in x.facts])
     still = replace(case, outputs=tuple(along_sweep(each) for each in case.outputs))
     steps = [2.0**-25, 2.0**-26, 2.0**-27]
     ends = [[proved(still, variable, axis, sign * x) for sign in (1.0, -1.0)] for x in steps]

@@ -163,7 +163,7 @@ def test_large_chunks_are_solved_in_parts(tmp_path):
     case = swept(case, np.linspace(-1.0, 1.0, 9001))
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     ready = Ready.of(Study(case, variation, 300, 4))
-    assert 8 < ready.lanes < 64
+    assert 8 < ready.outputs.at_once < 64
     parts, right = ready.chunk(0), cranks(case, variation, 4, 64)
     np.testing.assert_allclose(np.concatenate(parts.kept, axis=2), right, rtol=0, atol=1e-14)
     np.testing.assert_allclose(parts.summary.mean, right.mean(axis=2), rtol=0, atol=1e-14)
