@@ -51,6 +51,19 @@ def pytest_make_collect_report(collector):
     return report
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Leave the parameters to the night that `by_day(step)` does not try by day: of several lists
+    of parameters, each value comes with another one of the others.
+    """
+    for item in items:
+        for step in (each.args[0] for each in item.iter_markers("by_day")):
+            lists = [each.args[0] for each in item.iter_markers("parametrize")]
+            names = [each.split(",")[0] if isinstance(each, str) else each[0] for each in lists]
+            if sum(item.callspec.indices[name] for name in names) % step:
+                item.add_marker("nightly")
+
+
 def pytest_collection_finish():
     """Exclude the collected tests, a million objects, from garbage collection."""
     gc.collect()

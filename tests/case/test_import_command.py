@@ -14,6 +14,7 @@ from ..support.written_again import written_again
 QUANTITIES = ("position", "velocity", "acceleration")
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", cases.names())
 def test_built_in_case_round_trip(name, tmp_path):
     """Their references too, whose rows are exact."""

@@ -24,7 +24,6 @@ from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSp
 from kincheck.core.report.terminal import console
 
 from ..oracles import naive
-from ..support.by_night import sparse_by_day
 from ..support.case_texts import complains, edited, write
 from ..support.engine_forces import Beside, every_force, force_case, values
 from ..support.four_bar_within_digits import solved, truth, written
@@ -297,9 +296,8 @@ def test_exact_axes_give_true_forces(tmp_path):
     within(found, 0.0)
 
 
-@pytest.mark.parametrize(
-    "rounding", sparse_by_day(product("abcd", [0, 2], [1e-6, 1e-5, 1e-4]), 5), ids=str
-)
+@pytest.mark.by_day(5)
+@pytest.mark.parametrize("rounding", [*product("abcd", [0, 2], [1e-6, 1e-5, 1e-4])], ids=str)
 def test_rounded_axis_gives_true_forces(tmp_path, rounding):
     hinge, axis, digits = rounding
     file = rounded(tmp_path, {hinge: off_by(digits, axis)}, **closing(2.0 * digits))
@@ -308,6 +306,7 @@ def test_rounded_axis_gives_true_forces(tmp_path, rounding):
     within(found, digits)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     "more",
     [

@@ -94,6 +94,7 @@ def off(case, name, found, reference):
     return max(each.max_abs / each.tolerance for _, each in against.items() if each)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", CASES)
 def test_native_engine_equals_case_truth(name):
     case, found = solved(name)

@@ -32,7 +32,6 @@ from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Path, Ramp, Sine
 
-from ..support.by_night import sparse_by_day
 from ..support.mechanisms import X, Z
 
 BEND = 0.8  # cosine of the angle between the shafts
@@ -279,7 +278,8 @@ def test_orientation_from_offset_start(start):
 
 
 @pytest.mark.parametrize("name", [name for name in adapters.ENGINES if name != "native"])
-@pytest.mark.parametrize("steps", sparse_by_day([3, 4, 8, 25], 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("steps", [3, 4, 8, 25])
 def test_orientations_agree_in_all_engines(steps, name):
     """Half and whole turns are among the samples."""
     tested = adapters.engine(name)

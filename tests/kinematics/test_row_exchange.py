@@ -123,6 +123,7 @@ def test_bifurcation_after_row_exchange(first, turn):
     assert [pose["kind"] for pose in found.details["singular_poses"]] == ["bifurcation"]
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("style", "off"),
     [

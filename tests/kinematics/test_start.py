@@ -160,6 +160,7 @@ def test_pinion_rolls_from_any_angle(solved, angles):
         assert "notes" not in found.details
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("solved", WAYS)
 @pytest.mark.parametrize("kind", ["sine", "typed table"])
 def test_typed_digits_start_at_design(solved, kind):
@@ -269,6 +270,7 @@ FAR = 1.0
 """By what the arm at time zero is ahead of its design [rad]."""
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("solved", WAYS)
 def test_ambiguous_start_is_noted(solved):
     mechanism = arm(60.0)
@@ -303,6 +305,7 @@ def test_equal_starts_are_not_ambiguous():
     assert "go straight from it to time zero (u = 1.68" in note
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("solved", WAYS)
 def test_start_with_one_reachable_way(solved):
     """Straight to time zero, the tip would go through the hinge, where links of different lengths

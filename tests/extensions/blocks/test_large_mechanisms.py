@@ -41,7 +41,6 @@ from kincheck.core.mechanism.motions import Path, Ramp
 
 from ...report.page import report
 from ...support.block_structures import chain_of_hinges, solve_sparse
-from ...support.by_night import sparse_by_day
 from ...support.mechanisms import (
     ORIGIN,
     X,
@@ -181,18 +180,16 @@ def test_parallelogram_in_line_goes_on(ends, grid):
 
 
 # where the rod's arms are in line with it, what is nearly a parallelogram turns back
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     "shape",
-    sparse_by_day(
-        [
-            ("coarse", "hinges", 1e-6, 0.57053),
-            ("middle", "distance", 1e-6, 0.57053),
-            ("fine", "hinges", 1e-6, 0.57053),
-            ("coarse", "distance", 1e-4, 0.56846),
-            ("middle", "hinges", 1e-4, 0.56846),
-        ],
-        3,
-    ),
+    [
+        ("coarse", "hinges", 1e-6, 0.57053),
+        ("middle", "distance", 1e-6, 0.57053),
+        ("fine", "hinges", 1e-6, 0.57053),
+        ("coarse", "distance", 1e-4, 0.56846),
+        ("middle", "hinges", 1e-4, 0.56846),
+    ],
     ids=str,
 )
 def test_sparse_gap_ends_motion(shape):
@@ -266,6 +263,7 @@ def test_undriven_ring_names_freedom(cranks):
         solve(replace(ring(cranks), drivers=()), "turn", [0.0])
 
 
+@pytest.mark.nightly
 def test_designs_of_large_ring():
     """What is known of sigma of many variants at once leaves all samples of such a ring in doubt.
     Designs that end early say why.

@@ -416,6 +416,7 @@ TWO = "points = [[1.115, 0.665, 0.118], [1.14, 0.355, 0.1455]]"
 ONE = "point = [1.115, 0.665, 0.118]"
 
 
+@pytest.mark.nightly
 def test_explain_finds_library_cases_sound(capsys):
     for name in ("four_bar", "bricard", "delta_robot", "mcpherson_suspension"):
         assert main(["explain", name, "--samples", "3"]) == 0

@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from kincheck import adapters
@@ -124,6 +125,7 @@ def for_random_loops(test):
     return run(given(seed=st.integers(0, LOOPS - 1))(on_loop))
 
 
+@pytest.mark.nightly
 @for_random_loops
 def test_random_loop_moved_rigidly(rng, case, expected, allowed):
     turn, shift = Rotation.random(random_state=rng), rng.normal(size=3)

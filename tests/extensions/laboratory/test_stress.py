@@ -43,7 +43,6 @@ from kincheck.core.harness.record import Outcome
 from kincheck.core.joints.base import AxialJoint, unit
 from kincheck.core.mechanism.mechanism import Mechanism
 
-from ...support.by_night import sparse_by_day
 from ...support.engine_faults import changed
 from ...support.fakes import Fake, native_but, raising
 from ...support.loaded_slider_crank import GRAVITY, loaded
@@ -54,6 +53,7 @@ FEWER = {"loops": 3, "folds": 3}
 STRESS_FILES = sorted((Path(__file__).parents[2] / "data" / "stress").glob("*.toml"))
 
 
+@pytest.mark.nightly
 def test_stress_corner_beside_small_loop():
     """A corner that is turned round between two samples; stepped over where one sigma is asked for
     all blocks of the rows.
@@ -69,7 +69,8 @@ def test_stress_corner_beside_small_loop():
     assert found.counts[Verdict.RIGHT] == samples
 
 
-@pytest.mark.parametrize("name", sparse_by_day(FAMILIES, 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("name", FAMILIES)
 def test_stress_specimens_repeat_and_save(name, tmp_path):
     """The same numbers for the same seed, every kind of each family among them; a case file says
     all of them.
@@ -151,6 +152,7 @@ def test_numpy_solver_in_singular_family():
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("file", [*STRESS_FILES], ids=lambda file: file.stem)
 def test_former_silent_errors_stay_fixed(file):
     """The smallest mechanisms found so far, a sample each."""
@@ -180,6 +182,7 @@ def test_failed_proofs_are_counted(monkeypatch):
     assert "singular at the design" in proofs.reasons[0]
 
 
+@pytest.mark.nightly
 def test_starts_family_finds_rounded_starts(monkeypatch):
     """A tolerance of zero is the old rule: rounded and typed motions then start elsewhere."""
     made = specimens(FAMILIES["starts"], 1, 80)  # once, with their references

@@ -21,8 +21,6 @@ from kincheck.core.harness.execution import Answer, Pair, attempt
 from kincheck.core.joints import Kind
 from kincheck.core.kinematics import placed, places
 
-from ...support.by_night import sparse_by_day
-
 CLOSE = 1e-12
 VEHICLE = {"wheelbase": "2.6", "cg_height": "0.5", "brake_share": "0.6", "rack_per_turn": "0.05"}
 
@@ -75,7 +73,8 @@ FORMS = [
 
 
 @pytest.mark.parametrize("form", FORMS, ids=[form[0] for form in FORMS])
-@pytest.mark.parametrize("name", sparse_by_day(TEMPLATES, 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("name", TEMPLATES)
 def test_curves_of_corner_equal_runs(tmp_path, name, form):
     file = table(tmp_path, name, *form)
     case = load(file, Supplied(travel="0.03:5", position="front", **VEHICLE))
@@ -106,7 +105,8 @@ AXLES = [
 CORNERS = [(name, None) for name in TEMPLATES]
 
 
-@pytest.mark.parametrize("axle", sparse_by_day(AXLES, 4, 1), ids=str)
+@pytest.mark.by_day(8)
+@pytest.mark.parametrize("axle", AXLES, ids=str)
 def test_curves_of_asymmetric_axle_equal_run(tmp_path, axle):
     """Every place of the case moves by itself, so that left and right differ."""
     name, motion = axle
@@ -182,7 +182,8 @@ FINE = 2.0**40
 WHOLE = {f"{name} {motion or 'corner'}": (name, motion) for name, motion in [*CORNERS, *AXLES]}
 
 
-@pytest.mark.parametrize("key", sparse_by_day(WHOLE, 11))
+@pytest.mark.by_day(11)
+@pytest.mark.parametrize("key", WHOLE)
 def test_slopes_equal_differences_of_proved_digits(tmp_path, key):
     """Of all outputs: central differences of values proved to 40 digits, at three steps. What the
     extrapolation leaves out is of sixth order in the step of 1e-8 m over 1e-4 m, where the longest
