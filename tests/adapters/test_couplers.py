@@ -10,10 +10,6 @@ import pytest
 from kincheck.cases.jet import Jet, cos, sin, steady
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.errors import MechanismError
-from kincheck.core.extensions.exports.command import writer_of
-from kincheck.core.extensions.exports.model_writer import written
-from kincheck.core.extensions.same.undriven import undriven_case, undriven_file
-from kincheck.core.extensions.same.verdict import compare
 from kincheck.core.joints import (
     Cylindrical,
     Distance,
@@ -309,6 +305,10 @@ def test_linear_coupler_of_three_joints_passes(engine, tmp_path):
 
 
 def test_linear_coupler_in_written_files(tmp_path):
+    compare = pytest.importorskip("kincheck.core.extensions.same.verdict").compare
+    undriven = pytest.importorskip("kincheck.core.extensions.same.undriven")
+    written = pytest.importorskip("kincheck.core.extensions.exports.model_writer").written
+    writer_of = pytest.importorskip("kincheck.core.extensions.exports.command").writer_of
     case = differential(tmp_path)
     (file := tmp_path / "again.toml").write_text(case_text(case))
     assert load_case(file).mechanism.couplers == case.mechanism.couplers
@@ -316,7 +316,9 @@ def test_linear_coupler_in_written_files(tmp_path):
         for suffix, text in written(case, writer_of(form), None).items():
             (tmp_path / f"written_{form}{suffix}").write_text(text)
     for name in ("written_mjcf.xml", "written_urdf.urdf"):
-        same = compare(undriven_case(case, "case"), undriven_file(tmp_path / name), {})
+        same = compare(
+            undriven.undriven_case(case, "case"), undriven.undriven_file(tmp_path / name), {}
+        )
         assert same.verdict == "same", same.reason
         assert same.largest < 1e-14
 

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.case.case import TIME, Sweep
-from kincheck.core.extensions.laboratory.stress.families.arms import random_arm
-from kincheck.core.extensions.laboratory.stress.families.loops import random_mechanism
 from kincheck.core.joints import (
     Cylindrical,
     Fixed,
@@ -52,6 +50,12 @@ KINDS = (Revolute, Translational, Translational, Cylindrical, Screw)
 
 def random_case(seed):
     """A mechanism with masses, springs and loads, all its forces as outputs."""
+    random_mechanism = pytest.importorskip(
+        "kincheck.core.extensions.laboratory.stress.families.loops"
+    ).random_mechanism
+    random_arm = pytest.importorskip(
+        "kincheck.core.extensions.laboratory.stress.families.arms"
+    ).random_arm
     rng = np.random.default_rng(seed)
     if rng.random() < 0.4:
         mechanism, _ = random_arm(rng, int(rng.integers(2, 6)), KINDS)

@@ -16,9 +16,6 @@ from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.errors import CaseError
-from kincheck.core.extensions.explain.diagnose import diagnose
-from kincheck.core.extensions.explain.text import print_diagnosis
-from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.forces import Multipliers
 from kincheck.core.harness.run import run
 from kincheck.core.kinematics import NativeSolver, solve
@@ -450,6 +447,8 @@ def test_carrying_joints_keep_their_rows(tmp_path):
 
 
 def test_explain_names_redundant_rows(tmp_path):
+    print_diagnosis = pytest.importorskip("kincheck.core.extensions.explain.text").print_diagnosis
+    diagnose = pytest.importorskip("kincheck.core.extensions.explain.diagnose").diagnose
     file = rounded(tmp_path)
     found = diagnose(load_case(file), samples=3, tol=1e-12)
     assert [each.row.owner for each in found.redundant] == ["d"] * 3
@@ -470,6 +469,9 @@ def test_explain_names_redundant_rows(tmp_path):
 
 
 def test_proof_omits_undetermined_components(tmp_path):
+    prove_case = pytest.importorskip(
+        "kincheck.core.extensions.proofs.verified_reference"
+    ).prove_case
     pytest.importorskip("flint")
     file = rounded(tmp_path)
     case = load_case(file)

@@ -13,7 +13,6 @@ from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.measures import Component, Orientation
 from kincheck.core.case.measures import JointAngle as Angle
 from kincheck.core.case.quantity import with_markers
-from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
@@ -295,6 +294,9 @@ def test_orientations_agree_in_all_engines(steps, name):
 
 
 def test_proved_orientations_follow_turns():
+    prove_case = pytest.importorskip(
+        "kincheck.core.extensions.proofs.verified_reference"
+    ).prove_case
     pytest.importorskip("flint")
     values = [0.5, 4.0, 8.0]
     of = replace(swept(values), outputs=tuple(OUTPUTS[7:14]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import solve
-from kincheck.core.extensions.laboratory.bench.size import pivot, ring
+from kincheck.core.extensions.laboratory.bench.size import LEAN, pivot, ring
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
@@ -15,7 +15,7 @@ from kincheck.core.kinematics.continuation.singular_samples import scrutinise
 from kincheck.core.kinematics.continuation.walk import follow_samples
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 
-from ...support.block_structures import LEAN, assert_alike, solve_as, torus, with_one_program
+from ...support.block_structures import assert_alike, solve_as, torus, with_one_program
 from ...support.mechanisms import (
     BRANCH,
     chain,

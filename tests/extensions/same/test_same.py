@@ -15,10 +15,10 @@ from kincheck.core.extensions.exports.model_writer import written
 from kincheck.core.extensions.same.undriven import undriven_case, undriven_file
 from kincheck.core.extensions.same.verdict import compare
 
-from ... import converters
 from ...support.case_texts import write
 from ...support.model_files import driven
 from ...support.written_mechanisms import CASES, case
+from . import converters
 
 LIMIT = '<limit lower="-0.2" upper="0.8" effort="5" velocity="2"/>'
 MIMIC = '<mimic joint="left" multiplier="-1" offset="0.02"/>'

@@ -21,7 +21,7 @@ from kincheck.core.extensions.laboratory.stress.verdicts import with_numpy_execu
 from kincheck.core.mechanism.motions import Sine
 from scipy.spatial.transform import Rotation
 
-from ..support import mechanisms
+from ...support import mechanisms
 
 ENGINE = with_numpy_executor(adapters.engine("native"))
 LOOPS, LARGEST, SAMPLES = 8, 5, 5
