@@ -283,8 +283,9 @@ def read_recording(
 
 
 def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
-    opensim, notes = file.suffix.lower() in _OPENSIM, list[str]()
-    if file.suffix.lower() in JSON and sheet is None:
+    suffix, notes = file.suffix.lower(), list[str]()
+    opensim = suffix in _OPENSIM
+    if suffix in JSON and sheet is None:
         table, notes = table_of_json(file, LARGEST_FILE, LESS)
     else:
         table = read_table(file, sheet, "--sheet NAME", _END if opensim else "")
