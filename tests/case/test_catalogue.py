@@ -148,12 +148,6 @@ DATA = Path(__file__).parents[1] / "data"
 OURS = [*CASES, *sorted((DATA / "case_files").glob("*.toml")), *sorted(DATA.glob("stress/*.toml"))]
 
 
-def validator(name):
-    schema = schema_of(name)
-    jsonschema.Draft202012Validator.check_schema(schema)
-    return jsonschema.Draft202012Validator(schema)
-
-
 @pytest.fixture(scope="module")
 def case():
     return validator("case")

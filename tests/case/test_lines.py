@@ -13,7 +13,7 @@ from kincheck.core.case.io.document import Section, fault, parse_json
 from kincheck.core.case.io.lines import join, keys_of, line_of
 from kincheck.core.errors import CaseError
 
-from ..support.case_texts import edited, write
+from ..support.case_texts import edited, line_with, write
 from ..support.sources import ROOT
 
 NAMES = st.text("ab-_\" '#=]{}:,é\\", min_size=1, max_size=4).filter(lambda x: x == x.strip())
@@ -64,11 +64,6 @@ def in_line(value, rng):
         between = rng.choice([", ", ",\n", ", # ] \n"])
         return f"[{between.join(in_line(each, rng) for each in value)}]"
     return str(value)
-
-
-def line_with(text, number):
-    (line,) = (k for k, line in enumerate(text.splitlines(), 1) if str(number) in line)
-    return line
 
 
 @settings(deadline=None, max_examples=50)

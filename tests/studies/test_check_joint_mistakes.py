@@ -32,6 +32,7 @@ from kincheck.core.studies.checks.joint_loops import (
     with_own_drivers,
 )
 
+from ..support.driven_chains import at_origins
 from ..support.engine_faults import changed
 from ..support.fakes import native_but
 
@@ -350,13 +351,6 @@ def failing(joint_type, case_of=with_loads):
     """The failing checks of reactions of a joint type, loaded or driven in its own coordinates."""
     found = reactions(solve_probe(case_of(probe(joint_type))))
     return [each.check.removeprefix("reaction: ") for each in found if each.verdict is Verdict.FAIL]
-
-
-def at_origins(self, freedom, i, j):
-    """Slides between the internal origins of the bodies, not at the joint's point."""
-    P, h = vec(self.point), unit(self.axis)
-    between = p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
-    return between if freedom == "translation" else p.DrivenAngle(h)
 
 
 @pytest.mark.parametrize("base", [Translational, Screw])

@@ -359,8 +359,3 @@ def test_other_json_is_refused(recorded, capsys, kind):
     value, told = REFUSED[kind]
     assert recorded(json.dumps(value), name="run.json")[0] == 2
     assert told in capsys.readouterr().err
-
-
-def test_key_of_json_twice(recorded, capsys):
-    assert recorded('{"turn": [0], "turn": [1]}', name="run.json")[0] == 2
-    assert "the key 'turn' is given twice" in capsys.readouterr().err
