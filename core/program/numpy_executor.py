@@ -17,11 +17,6 @@ from .plan import DONE, ITERATIONS, MARGIN, Parts, Plan, Side
 from .straight_line import Program
 from .tape import LEAVES, NODES, operands, place_of
 
-
-def _angle(y: Array, x: Array, out: Array) -> None:
-    np.arctan2(y, x, out=out)
-
-
 _UFUNCS: dict[str, Callable[..., Any]] = {
     "+": np.add,
     "-": np.subtract,
@@ -31,7 +26,7 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "sqrt": np.sqrt,
     "sin": np.sin,
     "cos": np.cos,
-    "atan2": _angle,
+    "atan2": np.arctan2,
     "abs": np.absolute,
 }
 # by keyword: these reject a third positional array
@@ -52,11 +47,9 @@ Call = tuple[Callable[..., Any], tuple[Any, ...]]
 def _written_at_once(program: Program, last: Mapping[int, int]) -> dict[int, int]:
     """Return the slots of results that nothing reads later, by node: one slot for each."""
     read = dict[int, int]()
-    kept = set(program.outputs.values())
     for k, (op, *rest) in enumerate(program.nodes):
         if op in ("input", "node"):
-            end = len(program.nodes) if k in kept else last.get(k, k)
-            read[int(rest[0])] = max(read.get(int(rest[0]), 0), end)
+            read[int(rest[0])] = max(read.get(int(rest[0]), 0), last.get(k, k))
     return {
         node: slot
         for slot, node in program.outputs.items()
@@ -168,8 +161,9 @@ class NumpyExecutor:
         functions = {**_UFUNCS, "before": self._before}
         shape = (self._width,) if times == 1 else (times, self._width)
         scratch = np.empty((2, *shape))
-        last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
         kept = set(program.outputs.values())
+        last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
+        last |= dict.fromkeys(kept, len(program.nodes))
         own = {} if times > 1 else _written_at_once(program, last)
         place: list[Any] = []
         free: dict[type, list[Array]] = {np.float64: [], np.bool_: []}
@@ -189,11 +183,7 @@ class NumpyExecutor:
             arguments = [int(x) for x in rest]
             kind = np.bool_ if op == "larger" else np.float64
             read = [place[x] for x in arguments]
-            ended = {
-                x
-                for x in arguments
-                if last[x] == k and x not in kept and program.nodes[x][0] not in LEAVES
-            }
+            ended = {x for x in arguments if last[x] == k and program.nodes[x][0] not in LEAVES}
             if op == "where" and arguments[2] in ended:  # chosen in the place of its last operand
                 ended.remove(arguments[2])
                 out = read[2]
