@@ -38,6 +38,7 @@ EQUILIBRIUM = [
 ]
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", EQUILIBRIUM)
 def test_reactions_hold_bodies_in_equilibrium(name):
     """Newton and Euler, body by body: no row of the formulation is asked."""
@@ -192,6 +193,7 @@ def test_traced_forces_equal_svd_forces(name, compiled):
     assert_traced(loaded(case.mechanism), few(case), compiled=compiled)
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("style", styles()[1:])
 @pytest.mark.parametrize("name", ["mcpherson_strut", "four_bar"])
 def test_traced_forces_in_row_styles(style, name):

@@ -211,8 +211,8 @@ class BenchCompliance(Command):
 
 @options
 class BenchCurves(Command):
-    """Measure the time of all outputs of many designs against their kinematics alone, and of exact
-    slopes by the geometry.
+    """Measure the time of all outputs of many designs against their kinematics alone, of exact
+    slopes by the geometry, of a sweep, of the live page's answer, and of the first use.
     """
 
     about = "outputs of many designs, and their slopes by the geometry"
@@ -226,8 +226,9 @@ class BenchCurves(Command):
         from ...report.terminal import with_json
         from .bench.curves import lines, measure
 
-        case = registry.find_case(self.case, Supplied(axle=self.axle), driven=False)
-        found = measure(case, self.rounds)
+        supplied = Supplied(axle=self.axle)
+        case = registry.find_case(self.case, supplied, driven=False)
+        found = measure(case, Path(self.case), supplied, self.rounds)
         with with_json(found, self.json) as console:
             print(*lines(found), sep="\n", file=console.file)
         return Status.WITHIN
