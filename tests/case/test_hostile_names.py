@@ -156,8 +156,8 @@ def test_hostile_name_in_json(name):
 
 
 def test_hostile_name_in_csv(name, tmp_path):
-    write_csv(tmp_path / "a.csv", {"head": Kind.TEXT}, [[[name]]])
-    _, row = csv.reader((tmp_path / "a.csv").read_text().splitlines())
+    write_csv(file := tmp_path / "a.csv", {"head": Kind.TEXT}, [[[name]]])
+    _, row = csv.reader(file.read_text().splitlines())
     assert len(row) == 1
     assert row[0][:1] not in ("=", "+", "-", "@", "\t", "\r")
     assert row[0].isprintable()

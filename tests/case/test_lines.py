@@ -3,7 +3,6 @@
 import json
 import random
 import re
-from pathlib import Path
 
 import pytest
 from hypothesis import assume, given, settings
@@ -130,7 +129,7 @@ def test_json_key_twice_has_line(tree, seed):
     k = random.Random(seed).choice(keys)
     text = "\n".join([*rows[:k], f"{rows[k].rstrip(',')},", *rows[k:]])
     with pytest.raises(CaseError, match=rf"JSON: line {k + 2}: the key .+ is given twice"):
-        parse_json(Path("a.json"), text)
+        parse_json(ROOT / "a.json", text)
 
 
 def test_section_is_named_with_line(tmp_path):

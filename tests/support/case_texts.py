@@ -7,6 +7,7 @@ import pytest
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
+from kincheck.core.cli.lists import schema_of
 from kincheck.core.errors import CaseError, OpenError
 
 BASE = """

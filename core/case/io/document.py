@@ -13,7 +13,6 @@ import math
 import re
 import reprlib
 import tomllib
-from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
@@ -27,7 +26,7 @@ from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy, similar, 
 from ..units import METRE, FileUnits, Unit
 from .escape import visible
 from .foreign import binary, foreign
-from .lines import DEEPEST, TEXT, join, line_again, place
+from .lines import DEEPEST, TEXT, join, key_again, place
 
 # Squares and products of numbers within these bounds neither overflow nor underflow.
 LARGEST, SMALLEST = 1e100, 1e-100
@@ -290,9 +289,7 @@ def _blank(found: re.Match[str]) -> str:
 def _once(text: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     table = dict(pairs)
     if len(table) < len(pairs):
-        name, _ = Counter(name for name, _ in pairs).most_common(1)[0]
-        line = line_again(text, name)
-        raise ValueError(f"line {line}: the key {shown(name)} is given twice")
+        raise ValueError(f"{key_again(text)} is given twice")
     return table
 
 

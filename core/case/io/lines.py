@@ -122,11 +122,11 @@ def _name(token: str) -> str:
     return token
 
 
-def line_again(text: str, name: str) -> int:
-    """Return the line in which a key of JSON with a name stands again; 0 if there is none."""
+def key_again(text: str) -> str:
+    """Return the first key of JSON that stands again, with its line."""
     seen = set[str]()
     for path, line in keys_of(text[:LONGEST], ""):
-        if path in seen and path.endswith(name):
-            return line
+        if path in seen and path[-1] != "]":
+            return f"line {line}: the key {path!r}"
         seen.add(path)
-    return 0
+    return "a key"

@@ -92,7 +92,7 @@ class Samples:
         return next(str(cells[self.first]) for place, cells in rows if place == self.places[k])
 
 
-def read_table(file: Path, sheet: str | None, option: str, above: str = "") -> Table:
+def read_table(file: Path, sheet: str | None, option: str, above: str | None = None) -> Table:
     """Read the table of a reference or a recording.
 
     Args:
@@ -117,9 +117,8 @@ def read_table(file: Path, sheet: str | None, option: str, above: str = "") -> T
             f"found {len(lines)} lines, expected a row for each sample of the sweep; thin out the"
             " samples",
         )
-    if above:
-        last = next((k for k, line in enumerate(lines, 1) if line.strip().lower() == above), 0)
-        lines[:last] = [""] * last
+    last = next((k for k, line in enumerate(lines, 1) if line.strip().lower() == above), 0)
+    lines[:last] = [""] * last
     return text_table(file, lines, ("#",), _delimiter)
 
 

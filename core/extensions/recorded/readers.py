@@ -288,7 +288,7 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     if suffix in JSON and sheet is None:
         table, notes = table_of_json(file, LARGEST_FILE, LESS)
     else:
-        table = read_table(file, sheet, "--sheet NAME", _END if opensim else "")
+        table = read_table(file, sheet, "--sheet NAME", _END)
     table = _wide_table(table)
     layout = layout_of(table)
     chosen = choose([Head(*unit_of_head(file, layout.where, text)) for text in layout.heads])

@@ -86,7 +86,7 @@ def test_curve_layout_is_read(tmp_path, car, kind):
         found = np.degrees(case.reference[name].position)
         np.testing.assert_allclose(found, np.round(values, 5), atol=1e-12)
     left_out = " ".join(note for note in notes if "left out the rows" in note)
-    assert left_out.endswith(LEFT_OUT.get(kind, "")), left_out
+    assert left_out.endswith(LEFT_OUT.get(kind, ""))
     assert bool(left_out) == (kind in LEFT_OUT)
 
 

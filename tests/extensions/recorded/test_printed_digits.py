@@ -183,9 +183,8 @@ def test_unknown_columns_are_named(recorded):
 
 def test_lines_beside_samples_are_listed(recorded):
     turn = GRIDS["even"]
-    lines = text_of(digits(8), turn, *closed_form(turn)).splitlines()
-    lines = ["# units: inch", "Rig, 4711", *lines, "end of test", "# signs"]
-    status, record = recorded("\n".join(lines))
+    text = text_of(digits(8), turn, *closed_form(turn))
+    status, record = recorded(f"# units: inch\nRig, 4711\n{text}end of test\n# signs")
     assert status == 0
     assert (
         "left out the rows without samples: # units: inch, # signs, line 2 (Rig, 4711),"
