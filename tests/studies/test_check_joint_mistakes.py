@@ -72,6 +72,7 @@ def doubled_rows(self, i, j):
 
 
 def rows_without_arm(self, i, j):
+    """The force acts at the origin of body j."""
     return tuple(row._replace(pj=ZERO) for row in super(type(self), self).rows(i, j))
 
 
@@ -158,11 +159,6 @@ def slow(self, i, j):
 
 def short(self, i, j):
     return tuple(x + 1e-3 * self.drive.c for x in super(type(self), self).phi(i, j))
-
-
-def at_the_origin(self, i, j):
-    """The force acts at the origin of body j."""
-    return tuple(row._replace(pj=ZERO) for row in super(type(self), self).rows(i, j))
 
 
 def beside_the_axis(self, i, j):
@@ -277,7 +273,7 @@ MISTAKES_OF_DRIVERS = {
     "a drive along a straight axis": lambda: driving(gamma=without_bending),
     "a drive a thousandth slow": lambda: driving(nu=slow),
     "a drive a thousandth short": lambda: driving(phi=short),
-    "a drive at the origin": lambda: driving(rows=at_the_origin),
+    "a drive at the origin": lambda: driving(rows=rows_without_arm),
     "a drive beside the axis": lambda: driving(rows=beside_the_axis),
     "a drive on one body": lambda: driving(rows=on_one_body),
     "a drive of twice the force": lambda: driving(rows=doubled_rows),
