@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck import adapters, cases
-from kincheck.adapters import engine
 from kincheck.core.case.case import Series
-from kincheck.core.harness.execution import Answer, Attempt, Failure, Pair, attempt
+from kincheck.core.harness.execution import Attempt, Failure, attempt
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.mechanism.motions import Waypoints
@@ -218,15 +217,6 @@ def test_contradictions_are_written_read_and_resumed():
     engines = [Fake("native", answer=raising(AssertionError("not again"))), Fake()]
     again = run_case(crank(reference=False), *engines, made=read.records[:1])
     assert again.records[1].message == results.records[1].message
-
-
-# Derivatives by wheel travel at every sample of a combined sweep: other drivers are held
-
-
-def answer(case, name, mode="projection"):
-    found = attempt(Pair(case, engine(name, mode), 1e-12, timed=False)).result
-    assert isinstance(found, Answer), found
-    return found
 
 
 def test_waypoints_interpolate_smoothly():

@@ -389,7 +389,8 @@ class Ranks:
         equations = self.formulation
 
         def residuals(state: State) -> Array:
-            return np.array(equations.phi(equations.configuration(state)))
+            phi = equations.phi(equations.configuration(state))
+            return np.array(np.broadcast_arrays(*phi))
 
         state = equations.design
         for _ in range(STEPS):
@@ -397,9 +398,9 @@ class Ranks:
             if np.abs(phi).max(initial=0.0) <= CONSISTENT:
                 break
             # exact rows: simplified ones lead astray where phi = 0 is out of reach
+            # in lanes: functions of single numbers are real
             steps = 1j * COMPLEX_STEP * np.eye(equations.unknowns)
-            turned = [residuals(equations.retract(at, each.tolist())) for each in steps]
-            slopes = np.array(turned).imag.T / COMPLEX_STEP
+            slopes = residuals(equations.retract(at, [*steps])).imag / COMPLEX_STEP
             step = np.linalg.lstsq(slopes, -phi, rcond=RANK_TOLERANCE)[0]
             size = float(np.abs(step).max())
             state = equations.retract(at, (step * min(1.0, STEP / size) if size else step).tolist())

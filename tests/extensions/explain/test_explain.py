@@ -20,9 +20,11 @@ from kincheck.core import (
     OrientationLock,
     Point,
     PointCoordinate,
+    Polynomial,
     Revolute,
     Screw,
     Spherical,
+    Spline,
     Translational,
     solve,
 )
@@ -199,6 +201,19 @@ def test_contradiction_of_long_rods_by_length():
     assert [abs(each.amount) for each in found] == pytest.approx([1e-3, 1e-3], rel=1e-3)
     moved = with_joint(pushed, "right", length=0.999)  # now both are met, 1 mm to the right
     assert Ranks(moved).contradictions == []
+
+
+@pytest.mark.parametrize(
+    "coupler",
+    [
+        Polynomial("k", ("b", "a"), (0.1, 1.0)),
+        Spline("k", ("b", "a"), ((-1.0, -1.0), (1.0, 1.2))),
+    ],
+)
+def test_coupled_joint_begins_elsewhere(coupler):
+    hinges = [Revolute(x, "ground", x, X, X) for x in "ab"]
+    coupled = Mechanism("m", [*map(Body, "ab")], hinges, couplers=[coupler])
+    assert Ranks(coupled).contradictions == []
 
 
 def test_free_motion_is_described_by_body():
