@@ -15,12 +15,12 @@ from kincheck.core.caches import KEYS, ThreadCache, cache_last, clear_caches
 from kincheck.core.case import quantity
 from kincheck.core.case.models.files import load
 from kincheck.core.case.quantity import Output
+from kincheck.core.kinematics import placed, places
 from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled import routes as samples
 from kincheck.core.kinematics.compiled.compiled_model import source_files
 from kincheck.core.kinematics.compiled.request import Request, WantedOutput
 from kincheck.core.kinematics.continuation import walk
-from kincheck.core.kinematics.formulation.parameters import placed, places
 from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
 from kincheck.core.program.executor import compiler
