@@ -20,7 +20,6 @@ from kincheck.core.extensions.sweep.varied_places import Geometry
 from kincheck.core.harness.execution import Answer, Pair, attempt
 from kincheck.core.joints import Kind
 from kincheck.core.kinematics import placed, places
-from kincheck.core.kinematics.compiled import compiled_model
 
 CLOSE = 1e-12
 VEHICLE = {"wheelbase": "2.6", "cg_height": "0.5", "brake_share": "0.6", "rack_per_turn": "0.05"}
@@ -245,17 +244,6 @@ def test_chunks_equal_whole(corner):
     )
     assert whole.units == {"toe": "rad"}
     assert whole.places == dict.fromkeys(moved, "m")
-
-
-def test_tables_of_a_template_share_programs(tmp_path, monkeypatch):
-    """Other numbers, units, axes and places: the programs are those of the template."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    traced, trace = [], compiled_model._trace
-    monkeypatch.setattr(compiled_model, "_trace", lambda *x: traced.append(x) or trace(*x))
-    for k, (axes, units, per_mm) in enumerate(FORMS):
-        file = table(tmp_path, "double_wishbone", axes, units, (1.0 + 0.01 * k) * per_mm)
-        kincheck.curves(file, [f"lca_front {'xyz'[k]}"], [[0.0]], ["toe.per_travel"])
-    assert len(traced) == 1
 
 
 def test_curves_become_tables(corner):
