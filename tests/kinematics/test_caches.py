@@ -373,18 +373,6 @@ def test_new_numbers_need_no_new_trace(tmp_path, monkeypatch):
     assert len(traced) == 3
 
 
-def test_tables_of_a_template_share_programs(tmp_path, monkeypatch):
-    """Of other numbers, for curves by other places."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    traced, file = calls(monkeypatch, compiled_model, "_trace"), tmp_path / "car.csv"
-    text = sample_table(TEMPLATES["double_wishbone"])
-    for number, place in (("90", "lca_front x"), ("91.5", "tierod_inner z")):
-        file.write_text(text.replace("uca_front,90", f"uca_front,{number}"))
-        curves(file, [place], [[0.0]], ["toe.per_travel"])
-    assert "uca_front,91.5" in file.read_text()
-    assert len(traced) == 1
-
-
 def test_modules_of_suspension_outputs(tmp_path):
     """Those of an output that another one is made of, too: the slope by travel of toe."""
     suspension = "kincheck.core.extensions.hardpoints.suspension"
