@@ -102,9 +102,6 @@ AXLES = [
 ]
 
 
-CORNERS = [(name, None) for name in TEMPLATES]
-
-
 @pytest.mark.by_day(8)
 @pytest.mark.parametrize("axle", AXLES, ids=str)
 def test_curves_of_asymmetric_axle_equal_run(tmp_path, axle):
@@ -182,7 +179,7 @@ FINE = 2.0**40
 
 
 @pytest.mark.by_day(11)
-@pytest.mark.parametrize("whole", [*CORNERS, *AXLES], ids=str)
+@pytest.mark.parametrize("whole", [*((name, None) for name in TEMPLATES), *AXLES], ids=str)
 def test_slopes_equal_differences_of_proved_digits(tmp_path, whole):
     """Of all outputs: central differences of values proved to 40 digits, at three steps. What the
     extrapolation leaves out is of sixth order in the step of 1e-8 m over 1e-4 m, where the longest
