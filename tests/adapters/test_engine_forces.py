@@ -255,7 +255,7 @@ def test_spring_on_cut_joint_counts_turns(engine):
 
 @OF_ENGINES
 def test_forces_absent_without_force_outputs(engine):
-    plain, given = cases.load("mcpherson_suspension"), installed(engine)
+    plain, given = cases.load("mcpherson_strut"), installed(engine)
     case = replace(plain, mechanism=loaded(plain.mechanism))
     found, bare = (given.solve(given.build(each), each, 1e-12) for each in (case, plain))
     assert found.forces is None

@@ -351,6 +351,7 @@ def test_program_cache_key_covers_equations(tmp_path, monkeypatch):
     assert str(pathlib.Path(quantity.__file__).parent) in folders
 
 
+@pytest.mark.needs("llvm")
 def test_new_numbers_need_no_new_trace(tmp_path, monkeypatch):
     """Programs of varied places serve any numbers there: those found again equal those traced."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
