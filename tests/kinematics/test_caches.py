@@ -25,20 +25,12 @@ from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
 from kincheck.core.program.executor import compiler
 
+from ..support.fakes import calls
 from ..support.mechanisms import chain, mcpherson, solve_all
 
 DESIGNS = "kincheck.core.extensions.designs.design_batch"
 
 STROKES = np.linspace(-0.05, 0.05, 21)
-
-
-def calls(monkeypatch, owner, name):
-    """The arguments of all calls from now on."""
-    every, call = [], getattr(owner, name)
-    monkeypatch.setattr(
-        owner, name, lambda *given, **named: (every.append(given), call(*given, **named))[1]
-    )
-    return every
 
 
 @pytest.fixture
