@@ -24,6 +24,7 @@ from kincheck.core import (
 )
 from kincheck.core.extensions.blocks.sparse_lanes import POSES, SparseLanes, falling
 from kincheck.core.extensions.blocks.sparse_lu import Blocks
+from kincheck.core.extensions.blocks.sweep import Lanes
 from kincheck.core.extensions.laboratory.bench.size import LEAN, pivot, ring
 from kincheck.core.kinematics.formulation.acceptance_criteria import least_slope
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
@@ -32,6 +33,7 @@ from kincheck.core.kinematics.formulation.parameters import placed
 from kincheck.core.kinematics.formulation.state_vectors import jacobian
 from kincheck.core.kinematics.structure.degrees_of_freedom import NullSpaces
 from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.trajectory import QUANTITIES
 
 from ...support.block_structures import chain_of_hinges, solve_sparse
 from ...support.by_night import sparse_by_day
@@ -395,6 +397,7 @@ def test_iterations_of_even_samples_fall(monkeypatch):
 
     attempt = SparseLanes.attempt_at
     monkeypatch.setattr(SparseLanes, "attempt_at", counted)
+    monkeypatch.setattr(SparseLanes, "walk", Lanes.walk)
     turn = np.linspace(0.0, 0.8, 4 * POSES + 1)
     found = swept(ring(CRANKS), turn)
     assert found.solved.all()
@@ -404,6 +407,31 @@ def test_iterations_of_even_samples_fall(monkeypatch):
     uneven = np.concatenate([turn[:POSES] / 64.0, turn[1:]])
     assert swept(ring(CRANKS), uneven).solved.all()
     assert attempts == [POSES] * 5
+
+
+@pytest.mark.parametrize("uneven", [False, True])
+@pytest.mark.parametrize("ends", ["", "hinges"])
+def test_machine_code_walks_as_arrays_do(monkeypatch, ends, uneven):
+    """With redundant rows too, and where the polynomial does not reach."""
+    mechanism = four_bar(SHAPES["plain"], -1.1, ends) if ends else ring(CRANKS)
+    turn = np.linspace(0.0, 0.7, 5 * POSES - 3)
+    if uneven:
+        turn[:POSES] /= 64.0
+    arrays = list[int]()
+    with monkeypatch.context() as changed:
+        changed.setattr(SparseLanes, "attempt_at", lambda *_, **__: arrays.append(1))
+        walked = swept(mechanism, turn)
+    assert not arrays
+    monkeypatch.setattr(SparseLanes, "walk", Lanes.walk)
+    found = swept(mechanism, turn)
+    assert found.solved.all()
+    assert (walked.iterations == found.iterations).all()
+    sigmas = (each.details["smallest_singular_value"] for each in (walked, found))
+    assert next(sigmas) == pytest.approx(next(sigmas), rel=1e-12)
+    for name, motion in found.points.items():
+        for each in QUANTITIES:
+            off = getattr(motion, each) - getattr(walked.points[name], each)
+            assert np.abs(off).max() < 1e-12
 
 
 def test_slopes_fall_lane_by_lane():
