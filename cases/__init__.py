@@ -4,6 +4,9 @@ The truth is a table of samples (NAME.csv) or a closed form (NAME.py). Variants 
 a truth: NAME_VARIANT.toml names the samples in its [reference], or uses the closed form of NAME.py.
 Its motion is then the function VARIANT of NAME.py, or else the function `motion`. The function
 `forces` beside `motion`, or VARIANT_forces, returns the force outputs.
+
+An extension may have a folder `cases`: with cases that it reads, and with its own tables of cases
+here, in files of their names.
 """
 
 from __future__ import annotations
@@ -11,23 +14,45 @@ from __future__ import annotations
 import importlib
 import sys
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from ..core.case.case import Case, Origin, Output, Series, Truth
 from ..core.case.io.case_file import load_case
+from ..core.case.io.document import Section, parse
+from ..core.case.io.sections import sections
+from ..core.case.units import ANGLES, LENGTHS, FileUnits
+from ..core.doors import extensions
 from ..core.errors import CaseError, remedy
 from .jet import Jet, Lanes, Motion
 
 FOLDER = Path(__file__).resolve().parent  # in an editable installation, files are links
 
 
+@cache
+def _files() -> Mapping[str, Sequence[Path]]:
+    """Return the files of each case: the case, and tables of extensions."""
+    modules = (sys.modules[each.package] for each in extensions().values())
+    further = (Path(str(module.__file__)).resolve().parent / "cases" for module in modules)
+    found: dict[str, list[Path]] = {}
+    for folder in (FOLDER, *further):
+        for path in folder.glob("*.toml"):
+            found.setdefault(path.stem, []).append(path)
+    return found
+
+
 def names() -> tuple[str, ...]:
     """Return the names of the built-in cases, sorted."""
-    return tuple(sorted(file.stem for file in FOLDER.glob("*.toml")))
+    return tuple(sorted(_files()))
+
+
+def file(name: str) -> Path:
+    """Return the file of a built-in case, without the tables that extensions add."""
+    return _files()[name][0]
 
 
 def load(name: str) -> Case:
@@ -38,7 +63,10 @@ def load(name: str) -> Case:
     """
     if name not in names():
         raise CaseError(f"{name!r} is not a built-in case; {remedy(name, names())}")
-    case, motion = load_case(FOLDER / f"{name}.toml"), closed_form(name)
+    path, *further = _files()[name]
+    case, motion = load_case(path), closed_form(name)
+    for each in further:
+        case = _with_tables(case, each)
     if case.reference or motion is None:
         return case
     if not case.forces:
@@ -52,11 +80,20 @@ def summary(name: str) -> tuple[Truth, str]:
     """Return the kind of reference and the source of a built-in case, as in `load`, without the
     motion.
     """
-    with (FOLDER / f"{name}.toml").open("rb") as file:
-        found = tomllib.load(file)
+    found = tomllib.loads(file(name).read_text(encoding="utf-8"))
     if "reference" in found:
         return Truth(found["truth"]), found["source"]
     return (Truth.CLOSED_FORM if _module(name) else Truth.CONSENSUS_ONLY), found["source"]
+
+
+def _with_tables(case: Case, path: Path) -> Case:
+    """Return a case with the tables that extensions read of a file."""
+    units = FileUnits(LENGTHS[case.length_unit], ANGLES[case.angle_unit])
+    root = Section(path, "", parse(path, path.read_text(encoding="utf-8")), units)
+    for each in sections():
+        if (table := root.at(each.key)).value is not None:
+            case, _ = each.read(table, case)
+    return case
 
 
 def closed_form(name: str) -> Callable[..., Motion] | None:
@@ -74,7 +111,7 @@ def closed_form(name: str) -> Callable[..., Motion] | None:
 
 def _module(name: str) -> str:
     """Return the name of the module with a case's closed form; empty if there is none."""
-    stems = (file.stem for file in FOLDER.glob("*.py") if f"{name}_".startswith(f"{file.stem}_"))
+    stems = (path.stem for path in FOLDER.glob("*.py") if f"{name}_".startswith(f"{path.stem}_"))
     return max(stems, key=len, default="")
 
 

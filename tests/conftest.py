@@ -2,6 +2,7 @@
 
 import gc
 import os
+import re
 from functools import cache
 from pathlib import Path
 
@@ -36,6 +37,31 @@ settings.load_profile("repeatable")
 gc.set_threshold(50_000, 20, 20)
 
 NATIVE = Fake("native")
+OF_EXTENSION = re.compile(r"kincheck\.(core\.extensions|adapters)\.\w+")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector):
+    """Leave out test files that import an extension that is not there."""
+    report = yield
+    error = report.call.excinfo and report.call.excinfo.value.__cause__
+    if isinstance(error, ModuleNotFoundError) and OF_EXTENSION.fullmatch(error.name or ""):
+        report.outcome = "skipped"
+        report.longrepr = str(collector.path), 0, f"{error.name} is not there"
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Leave the parameters to the night that `by_day(step)` does not try by day: of several lists
+    of parameters, each value comes with another one of the others.
+    """
+    for item in items:
+        for step in (each.args[0] for each in item.iter_markers("by_day")):
+            lists = [each.args[0] for each in item.iter_markers("parametrize")]
+            names = [each.split(",")[0] if isinstance(each, str) else each[0] for each in lists]
+            if sum(item.callspec.indices[name] for name in names) % step:
+                item.add_marker("nightly")
 
 
 def pytest_collection_finish():

@@ -2,8 +2,12 @@
 
 For each name, by default for each extension: a copy of the sources without its folder and its tests
 lists commands and engines, solves a case in native, and imports every module whose extension is
-still there. With --tests it also deletes what needs the extension, and runs the tests that are
-left.
+still there. With --tests it also deletes what needs the extension, collects all tests that are
+left, and runs those that walk over commands, documents and sources.
+
+With --alone a copy has an extension and its needs alone, and runs its tests; NAME kernel has no
+extension, and runs the tests of the kernel. Together they take as long as the suite, and tests that
+ask for no more than their extension needs are right without any other.
 """
 
 import argparse
@@ -12,6 +16,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from kincheck.core.doors import extensions
@@ -20,6 +25,12 @@ from .support.sources import EXTENSIONS, PACKAGE, ROOT
 
 COPIED = "core", "adapters", "cases", "tests", "docs", ".github", ".ci"
 FILES = "*.toml", "*.py", "*.md", "*.in", "*.lock", "*.cff", "Makefile", "Containerfile"
+KERNEL = "kernel"
+WALKS = (
+    *("tests/test_architecture.py", "tests/test_doors.py", "tests/test_packages.py"),
+    *("tests/test_public_names.py", "tests/test_source_rules.py", "tests/docs"),
+    *("tests/case/test_catalogue.py", "tests/cli/test_cli.py", "tests/cli/test_options.py"),
+)
 WORKS = """
 import importlib, pkgutil, sys
 import kincheck
@@ -44,15 +55,16 @@ for command in (["--help"], ["list"], ["run", "mcpherson_strut", "--engine", "na
 """
 
 
-def copy_without(name: str, folder: Path) -> None:
-    """Copy the sources without an extension, laid out as an installation has them."""
+def copy_without(names: Iterable[str], folder: Path) -> None:
+    """Copy the sources without extensions, laid out as an installation has them."""
     for each in COPIED:
         shutil.copytree(
             ROOT / each, folder / each, ignore=shutil.ignore_patterns("__pycache__", ".hypothesis")
         )
     for file in (file for pattern in FILES for file in ROOT.glob(pattern)):
         shutil.copy(file, folder)
-    delete(name, folder)
+    for name in names:
+        delete(name, folder)
     package = folder / "site" / "kincheck"
     shutil.copytree(folder / PACKAGE, package)
     for each in COPIED[:3]:
@@ -72,25 +84,47 @@ def those_that_need(name: str) -> set[str]:
     return found.union(*map(those_that_need, found))
 
 
+def needed(name: str) -> set[str]:
+    """Return the extensions that one needs, directly or by another."""
+    needs = set(extensions()[name].needs) if name in extensions() else set[str]()
+    return needs.union(*map(needed, needs))
+
+
+def steps(name: str, folder: Path, options: argparse.Namespace) -> Iterator[Sequence[str]]:
+    """Make the copy of a name, and yield the commands to run in it, each when it is ready."""
+    pytest = (sys.executable, "-m", "pytest")
+    every = {each.name for each in EXTENSIONS}
+    if options.alone:
+        copy_without(every - {name, *needed(name)}, folder)
+        own = Path("tests/extensions", name)
+        if name == KERNEL:
+            yield *pytest, "--numprocesses", "auto"
+        elif (folder / own).exists():
+            yield *pytest, "--numprocesses", "auto", str(own)
+        return
+    copy_without([name], folder)
+    yield sys.executable, "-c", WORKS, name, *sorted(every)
+    if options.tests:
+        for each in those_that_need(name):
+            delete(each, folder)
+        yield *pytest, "--collect-only"
+        yield *pytest, "--numprocesses", "auto", *WALKS
+
+
 def main() -> int:
-    """Print a line for each extension; return 1 if something broke without one."""
+    """Print a line for each step; return 1 if something broke."""
     names = sorted(each.name for each in EXTENSIONS)
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", choices=[*names, []])
-    parser.add_argument("--tests", action="store_true", help="run the tests that are left, too")
+    parser.add_argument("names", nargs="*", metavar="NAME", choices=[KERNEL, *names, []])
+    parser.add_argument("--tests", action="store_true", help="collect and walk, too")
+    parser.add_argument("--alone", action="store_true", help="with its needs alone: its tests")
     options = parser.parse_args()
     failed = False
-    for name in options.names or names:
+    for name in options.names or ([KERNEL, *names] if options.alone else names):
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
-            copy_without(name, folder)
             environment = {**os.environ, "PYTHONPATH": str(folder / "site")}
-            commands = [[sys.executable, "-c", WORKS, name, *names]]
-            if options.tests:
-                commands.append([sys.executable, "-m", "pytest", "--numprocesses", "auto"])
-            for k, command in enumerate(commands):
-                for each in those_that_need(name) if k else ():
-                    delete(each, folder)
+            for command in steps(name, folder, options):
                 done = subprocess.run(
                     command, cwd=folder, env=environment, capture_output=True, text=True
                 )
@@ -98,7 +132,10 @@ def main() -> int:
                 failed = failed or broken
                 lines = (done.stdout + done.stderr).splitlines() if broken else []
                 print(
-                    f"{name}: {'broke' if broken else 'works without it'}", *lines[-20:], sep="\n"
+                    f"{name}: {'broke' if broken else 'works'}",
+                    *lines[-40:],
+                    sep="\n",
+                    flush=True,
                 )
     return failed
 

@@ -3,12 +3,23 @@ offender below.
 """
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
 
 from .support.case_texts import rows
-from .support.sources import DOOR, SOURCES, TESTS, imported, module_of, tree
+from .support.sources import (
+    DOOR,
+    EXTENSIONS,
+    MODULES,
+    SOURCES,
+    TESTS,
+    extension_of,
+    imported,
+    module_of,
+    tree,
+)
 
 SIMULATORS = {"mujoco", "pinocchio", "exudyn", "opensim", "pydrake", "dartpy"}
 
@@ -92,11 +103,42 @@ def long_test_names(path, syntax):
             yield f"{name} has more than {MOST_WORDS} words"
 
 
+IN_EXTENSION = re.compile(r"kincheck((?:\.core\.extensions|\.adapters)\.\w+)((?:\.\w+)*)")
+SHARED = {"extensions", "oracles", "support"}
+
+
+def bound_to_extensions(path, syntax):
+    """Yield extensions that a test of the kernel imports, so that it goes with them, and misspelt
+    modules that a test is skipped without.
+    """
+    for target in imported(path, syntax):
+        module = module_of(target[1:]) if target[0] == "kincheck" else None
+        if module and extension_of(module) and path.parts[1] not in SHARED:
+            yield f"imports {module}: move the test, or use pytest.importorskip in it"
+    for node in ast.walk(syntax):
+        name = isinstance(node, ast.Constant) and IN_EXTENSION.fullmatch(str(node.value))
+        folder = name and tuple(name[1].strip(".").split("."))
+        if folder and Path(*folder) in EXTENSIONS:
+            target = (*folder, *filter(None, name[2].split(".")))
+            if (
+                target not in MODULES
+                and getattr(module_of(target), "stem", "__init__") == "__init__"
+            ):
+                yield f"names {node.value}, which is nowhere"
+
+
 RULES = {
     rule.__name__: rule
-    for rule in (past_the_door, simulators_at_import, undocumented, bare_packages, long_test_names)
+    for rule in (
+        past_the_door,
+        simulators_at_import,
+        undocumented,
+        bare_packages,
+        long_test_names,
+        bound_to_extensions,
+    )
 }
-OF_TESTS = {"bare_packages", "long_test_names"}
+OF_TESTS = {"bare_packages", "long_test_names", "bound_to_extensions"}
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -146,6 +188,18 @@ simulators_at_import | adapters/new.py
 undocumented | core/new.py | "Doc."\\ndef _f(): ...
 bare_packages | tests/test_new.py
     | from kincheck.core.algebra import Vec3\\nfrom .oracles.naive import A
+"""
+
+
+if EXTENSIONS:
+    ANY = ".".join(min(EXTENSIONS).parts)
+    OFFENDERS += f"""\
+bound_to_extensions | tests/test_new.py | def f():\\n    from kincheck.{ANY} import EXTENSION
+bound_to_extensions | tests/test_new.py | x = 'kincheck.{ANY}.nowhere'
+"""
+    ALLOWED += f"""\
+bound_to_extensions | tests/extensions/new/test_new.py | import kincheck.{ANY}
+bound_to_extensions | tests/test_new.py | x = 'kincheck.{ANY}', 'kincheck.core.extensions.gone.new'
 """
 
 

@@ -292,13 +292,19 @@ def _way(q: Array, v: Array, lengths: Array) -> tuple[Array, Array]:
     are those of the rows only on the unit sphere.
     """
     q, v, s = q.reshape(-1, 7), v.reshape(-1, 7), lengths[:, None, None]
-    turn = np.sqrt((v[:, 3:] ** 2).sum(axis=1, keepdims=True))
+    turn = _sizes(v[:, 3:])
     p, d = q[:, 3:] + NO_ROTATION, v[:, 3:] / np.where(turn, turn, 1.0)
-    cosine, sine = np.cos(s * turn), np.sin(s * turn)
+    # real part: cosine p + sine d; imaginary part: sine p - cosine d
+    turned = np.exp(1j * (s * turn)) * (p - 1j * d)
     coordinates, rates = q + s * v, np.empty((len(s), *v.shape))
-    coordinates[..., 3:] = cosine * p + sine * d - NO_ROTATION
-    rates[..., :3], rates[..., 3:] = v[:, :3], turn * (cosine * d - sine * p)
+    coordinates[..., 3:] = turned.real - NO_ROTATION
+    rates[..., :3], rates[..., 3:] = v[:, :3], -turn * turned.imag
     return coordinates.reshape(len(s), -1), rates.reshape(len(s), -1)
+
+
+def _sizes(p: Array) -> Array:
+    """Return the lengths of rows, shape (n, 1)."""
+    return np.sqrt(np.einsum("ij,ij->i", p, p))[:, None]
 
 
 class ExudynModel:
@@ -377,7 +383,7 @@ class ExudynModel:
         x = self.x + dx
         q = x[: self.coordinates].reshape(-1, 7)
         p = q[:, 3:] + NO_ROTATION
-        q[:, 3:] = p / np.sqrt((p * p).sum(axis=1, keepdims=True)) - NO_ROTATION
+        q[:, 3:] = p / _sizes(p) - NO_ROTATION
         self.restore(x)
 
     def residual(self, c: Array) -> Array:
@@ -407,7 +413,7 @@ class ExudynModel:
     def jacobian(self) -> Array:
         # ComputeJacobianAE adds to the matrix; this call clears it first
         self.solver.ComputeNewtonJacobian(self.mbs, self.settings)
-        found = self.solver.GetSystemJacobian()[self.kept, : self.coordinates]
+        found = self.solver.GetSystemJacobian().take(self.kept, axis=0)[:, : self.coordinates]
         if not self.shared.size:
             return found
         for row, place, curve in self.bent:
@@ -426,7 +432,7 @@ class ExudynModel:
         unit_rates, bias = v / speed, np.zeros(len(self.kept))
         for h in DIFFERENCES:
             way = zip(*_way(self.q, unit_rates, h * STEPS), strict=True)
-            bias, low = WEIGHTS @ [self._rates(*each) for each in way] / h
+            bias, low = (WEIGHTS / h @ [self._rates(*each) for each in way])[:, self.kept]
             if np.abs(bias - low).max() <= AGREE * max(np.abs(bias).max(), 1.0):
                 break
         # the rows of the normalisation, |p|^2 = 1, stay satisfied on the way by its curvature alone
@@ -439,11 +445,11 @@ class ExudynModel:
         return bias
 
     def _rates(self, q: Array, q_t: Array) -> Array:
-        """Return the rates of the rows."""
+        """Return the rates of all rows of Exudyn's system."""
         self.state.SetODE2Coordinates(q)
         self.state.SetODE2Coordinates_t(q_t)
         self.solver.ComputeAlgebraicEquations(self.mbs, True)
-        return self.solver.GetSystemResidual()[self.kept]
+        return self.solver.GetSystemResidual()
 
     def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
         self.state.SetODE2Coordinates_t(v[: self.coordinates])

@@ -85,6 +85,9 @@ MAX_ITERATIONS = 20
 RANK_TOLERANCE = 1e-9
 # Step at which least squares have converged: the remaining residual comes from contradictory rows.
 ARRIVED = 1e-6
+# After a step of this size the next is about its square. The factors of before turn that by about
+# the size once more, below round-off.
+NEAR = 1e-5
 # Largest error of a pose that counts as round-off, of unknowns of size one.
 EXACT = 4.0 * float(np.finfo(np.float64).eps)
 
@@ -179,13 +182,15 @@ class Walk:
         free, work = np.zeros((self.unknowns, 1), dtype=np.int32), 64 * (self.rows + self.unknowns)
         return self.lapack.dgelsy(A, b, free, RANK_TOLERANCE, work)[1][: self.unknowns]
 
-    def _step(self, r: Array) -> Array:
-        """Return Newton's step for residuals."""
-        A = self.model.jacobian()
+    def _step(self, r: Array, *, again: bool) -> Array:
+        """Return Newton's step for residuals, with the factors of the last step again or not."""
         if not self.square:
-            return self._least_squares(A, -r)
-        *_, step, singular = self.lapack.dgesv(A, -r)
-        return np.asarray(step if not singular else math.nan * r, dtype=np.float64)
+            return self._least_squares(self.model.jacobian(), -r)
+        if not again:
+            self.factors = self.lapack.dgetrf(self.model.jacobian())
+        lu, pivots, singular = self.factors
+        step = math.nan * r if singular else self.lapack.dgetrs(lu, pivots, -r)[0]
+        return np.asarray(step, dtype=np.float64)
 
     def newton(self, c: Array) -> tuple[Array, int, float] | None:
         """Return the sum of all steps, the iterations and the last residual at driver values c, or
@@ -210,7 +215,7 @@ class Walk:
                 if met:
                     break
                 met = worst <= self.tol
-            step = self._step(r)
+            step = self._step(r, again=self.corrections is None and moved <= NEAR)
             moved = float(np.abs(step).max())
             if not math.isfinite(moved):
                 return None

@@ -79,16 +79,14 @@ def sources(names: Iterable[str]) -> dict[str, str]:
     Args:
         names: of them, MODULE:CLASS or MODULE.
     """
-    named = [sys.modules.get(name.partition(":")[0]) for name in names]
+    named = [module for name in names if (module := sys.modules.get(name.partition(":")[0]))]
     folders = {
         file.parent
         for module in named
-        if module is not None
-        and (file := _file(module)) is not None
-        and INSTALLED not in file.parts
+        if (file := _file(module)) is not None and INSTALLED not in file.parts
     }
     found: dict[str, str] = {}
-    for name, module in sorted(sys.modules.items()):
+    for name, module in sorted(sys.modules.items()) if named else ():
         file = _file(module)
         if file is None or name.split(".")[0] == "kincheck":
             continue

@@ -5,7 +5,8 @@ No start-up cost; the oracle of the tests.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,19 +17,6 @@ from .plan import DONE, ITERATIONS, MARGIN, Parts, Plan, Side
 from .straight_line import Program
 from .tape import LEAVES, NODES, operands, place_of
 
-
-def _min(a: Array, b: Array, out: Array) -> None:
-    np.minimum(a, b, out=out)  # by keyword: numpy rejects a third positional array
-
-
-def _max(a: Array, b: Array, out: Array) -> None:
-    np.maximum(a, b, out=out)
-
-
-def _angle(y: Array, x: Array, out: Array) -> None:
-    np.arctan2(y, x, out=out)
-
-
 _UFUNCS: dict[str, Callable[..., Any]] = {
     "+": np.add,
     "-": np.subtract,
@@ -38,11 +26,11 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "sqrt": np.sqrt,
     "sin": np.sin,
     "cos": np.cos,
-    "atan2": _angle,
+    "atan2": np.arctan2,
     "abs": np.absolute,
-    "min": _min,
-    "max": _max,
 }
+# by keyword: these reject a third positional array
+_EXTREMES = {"min": np.minimum, "max": np.maximum}
 
 # The iteration of neighbours goes on while each takes as many more of them again: the others are
 # iterated with the next group, which is nearer.
@@ -50,12 +38,23 @@ WORTH = 2.0
 # A group is at most so many times as long as what was accepted of the one before: lanes farther
 # away would take more iterations for nothing.
 GROWS = 1.5
+# Up to so many lanes are run by themselves: beside a call's own time theirs counts little.
+NARROW = 64
 
 Call = tuple[Callable[..., Any], tuple[Any, ...]]
 
 
-def _larger(a: Array, b: Array, size_a: Array, size_b: Array, out: Array) -> None:
-    np.greater(np.absolute(a, size_a), np.absolute(b, size_b), out=out)
+def _written_at_once(program: Program, last: Mapping[int, int]) -> dict[int, int]:
+    """Return the slots of results that nothing reads later, by node: one slot for each."""
+    read = dict[int, int]()
+    for k, (op, *rest) in enumerate(program.nodes):
+        if op in ("input", "node"):
+            read[int(rest[0])] = max(read.get(int(rest[0]), 0), last.get(k, k))
+    return {
+        node: slot
+        for slot, node in program.outputs.items()
+        if program.nodes[node][0] not in LEAVES and node > read.get(slot, -1)
+    }
 
 
 def _largest(out: Array, values: Array) -> None:
@@ -74,10 +73,10 @@ class NumpyExecutor:
     margin = 0
 
     def __init__(self, plan: Plan, lanes: int) -> None:
-        self.lanes = self.group = lanes
+        self.lanes = self.group = self._width = lanes
         self.block: Array = np.zeros((len(plan.slots), lanes))
         self.plan = plan
-        self._calls: dict[str, list[Call]] = {}
+        self._calls: dict[tuple[str, int], list[Call]] = {}
 
     def clear(self) -> None:
         """Set all slots of all lanes to zero."""
@@ -97,10 +96,11 @@ class NumpyExecutor:
 
     def run(self, name: str) -> None:
         """Run one of `Plan.programs` over all lanes."""
-        if name not in self._calls:
-            self._calls[name] = self._bind(self.plan.programs[name])
+        key = name, self._width
+        if key not in self._calls:
+            self._calls[key] = self._bind(self.plan.programs[name])
         with np.errstate(all="ignore"):
-            for call, arguments in self._calls[name]:
+            for call, arguments in self._calls[key]:
                 call(*arguments)
 
     def attempt(self) -> None:
@@ -115,8 +115,10 @@ class NumpyExecutor:
                 iteration ends when it takes few more of them.
         """
         slots, ready = self.plan.slots, 0
-        residual, iterations = (self.block[slots[name]] for name in ("residual", ITERATIONS))
-        done = np.zeros(self.lanes, dtype=np.bool_)
+        self._width = NARROW if 0 < neighbours <= NARROW < self.lanes else self.lanes
+        block = self.block[:, : self._width]
+        residual, iterations = (block[slots[name]] for name in ("residual", ITERATIONS))
+        done = np.zeros(self._width, dtype=np.bool_)
         iterations[:] = 0.0
         self.run(start)
         for _ in range(self.plan.most):
@@ -128,9 +130,10 @@ class NumpyExecutor:
                 break
         for name in self.plan.after:
             self.run(name)
-        self.block[slots[DONE]] = done
+        block[slots[DONE]] = done
         for name in tests:
             self.run(name)
+        self._width = self.lanes
 
     def carry(self) -> None:
         """Copy `Plan.carried` of all lanes, for the next prediction."""
@@ -154,15 +157,14 @@ class NumpyExecutor:
 
     def _bind(self, program: Program) -> list[Call]:
         """Return the calls of a program; a register is free again after its last reader."""
-        times, block, functions = (
-            program.times,
-            self.block,
-            {**_UFUNCS, "before": self._before},
-        )
-        shape = self.lanes if times == 1 else (times, self.lanes)
-        scratch = np.empty((2, self.lanes)) if times == 1 else np.empty((2, times, self.lanes))
-        last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
+        times, block = program.times, self.block[:, : self._width]
+        functions = {**_UFUNCS, "before": self._before}
+        shape = (self._width,) if times == 1 else (times, self._width)
+        scratch = np.empty((2, *shape))
         kept = set(program.outputs.values())
+        last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
+        last |= dict.fromkeys(kept, len(program.nodes))
+        own = {} if times > 1 else _written_at_once(program, last)
         place: list[Any] = []
         free: dict[type, list[Array]] = {np.float64: [], np.bool_: []}
         calls: list[Call] = []
@@ -180,24 +182,29 @@ class NumpyExecutor:
                 continue
             arguments = [int(x) for x in rest]
             kind = np.bool_ if op == "larger" else np.float64
-            out = free[kind].pop() if free[kind] else np.empty(shape, kind)
-            place.append(out)
             read = [place[x] for x in arguments]
+            ended = {x for x in arguments if last[x] == k and program.nodes[x][0] not in LEAVES}
+            if op == "where" and arguments[2] in ended:  # chosen in the place of its last operand
+                ended.remove(arguments[2])
+                out = read[2]
+            elif k in own:
+                out = block[own[k]]
+            else:
+                out = free[kind].pop() if free[kind] else np.empty(shape, kind)
+            place.append(out)
             if op == "larger":
-                calls.append((_larger, (*read, *scratch, out)))
+                sizes = zip(read, scratch, strict=True)
+                calls += [(np.absolute, pair) for pair in sizes] + [(np.greater, (*scratch, out))]
             elif op == "where":  # every other operation where rows are chosen; two calls are
                 decision, chosen, otherwise = read  # quicker than one of Python around them
-                calls += [
-                    (np.copyto, (out, otherwise)),
-                    (np.putmask, (out, decision, chosen)),
-                ]
+                calls += [(np.copyto, (out, otherwise))] if out is not otherwise else []
+                calls.append((np.putmask, (out, decision, chosen)))
+            elif op in _EXTREMES:
+                calls.append((partial(_EXTREMES[op], out=out), (*read,)))
             else:
                 calls.append((functions[op], (*read, out)))
-            for x in set(arguments):
-                if last[x] == k and x not in kept and program.nodes[x][0] not in LEAVES:
-                    free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(
-                        place[x]
-                    )
+            for x in ended:
+                free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(place[x])
         # an input that goes to another slot must survive the output that overwrites its own
         for node in kept:
             if program.nodes[node][0] in ("input", "node"):
@@ -206,7 +213,9 @@ class NumpyExecutor:
                 place[node] = copy
         write = np.copyto if times == 1 else _largest
         return calls + [
-            (write, (block[slot], place[node])) for slot, node in program.outputs.items()
+            (write, (block[slot], place[node]))
+            for slot, node in program.outputs.items()
+            if own.get(node) != slot or place[node].base is not self.block
         ]
 
     def track(self, sides: Sequence[Side], start: Array, n: int) -> NumpyTrack:

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.case.case import TIME, Sweep
-from kincheck.core.extensions.laboratory.stress.families.arms import random_arm
-from kincheck.core.extensions.laboratory.stress.families.loops import random_mechanism
 from kincheck.core.joints import (
     Cylindrical,
     Fixed,
@@ -28,7 +26,6 @@ from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism
 from kincheck.core.mechanism.motions import JointAngle
 
-from ..support.by_night import sparse_by_day
 from ..support.driven_chains import (
     COUPLINGS,
     Link,
@@ -53,6 +50,12 @@ KINDS = (Revolute, Translational, Translational, Cylindrical, Screw)
 
 def random_case(seed):
     """A mechanism with masses, springs and loads, all its forces as outputs."""
+    random_mechanism = pytest.importorskip(
+        "kincheck.core.extensions.laboratory.stress.families.loops"
+    ).random_mechanism
+    random_arm = pytest.importorskip(
+        "kincheck.core.extensions.laboratory.stress.families.arms"
+    ).random_arm
     rng = np.random.default_rng(seed)
     if rng.random() < 0.4:
         mechanism, _ = random_arm(rng, int(rng.integers(2, 6)), KINDS)
@@ -141,6 +144,7 @@ def in_loops(engines, kinds, orders):
     return found
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(("kind", "bodies", "engine"), in_loops(ENGINES, TYPES, ["AB", "BA"]))
 def test_joint_reactions_equal_native(kind, bodies, engine):
     _, solution = assert_as_native(engine, joint_case, kind, bodies)
@@ -361,7 +365,8 @@ for name, (one, other, coupling) in COUPLINGS.items():
 
 
 @pytest.mark.parametrize("engine", AGREE)
-@pytest.mark.parametrize("name", sparse_by_day(CHAINS, 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("name", CHAINS)
 def test_driver_efforts_equal_free_bodies(name, engine):
     made = CHAINS[name]
     sweep = Sweep(TIME, made.path.times, motions=made.path.motions)
@@ -376,6 +381,7 @@ def test_driver_efforts_equal_free_bodies(name, engine):
 SEEDS = (0, 1, 9, 21, 24, 27, 32, 37, 45, 63)
 
 
+@pytest.mark.by_day(2)
 @OF_ENGINES
 @pytest.mark.parametrize("seed", SEEDS)
 def test_forces_of_random_mechanisms_equal_native(seed, engine):

@@ -12,8 +12,6 @@ from kincheck.core import Body, Joint, JointAngle, Revolute, Translational
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, cross, vec
 from kincheck.core.doors import offers
-from kincheck.core.extensions.exports.command import writer_of
-from kincheck.core.extensions.exports.model_writer import written
 from kincheck.core.joints import Planar
 from kincheck.core.joints.base import directions, position, triad, unit
 from kincheck.core.mechanism.mechanism import with_equivalents
@@ -95,6 +93,8 @@ def test_user_joint_equivalent_is_simulated(name, atol):
 
 @pytest.mark.parametrize("name", offers("writers"))
 def test_written_model_holds_joint_equivalent(name):
+    written = pytest.importorskip("kincheck.core.extensions.exports.model_writer").written
+    writer_of = pytest.importorskip("kincheck.core.extensions.exports.command").writer_of
     assert "slot_block" in "".join(written(quick_return(), writer_of(name)).values())
 
 

@@ -19,7 +19,6 @@ from kincheck.core.joints import (
 )
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
 
-from ..support.by_night import sparse_by_day
 from ..support.engine_motion import (
     BOTH_ORDERS,
     ENGINES,
@@ -67,6 +66,7 @@ def all_loops():
     return found
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(("engine", "kind", "bodies", "closing"), all_loops())
 def test_joint_in_loop_moves_as_native(engine, kind, bodies, closing):
     mechanism = on_crank(kind, *bodies)
@@ -99,7 +99,8 @@ def on_screw(theta, axis, point, lead, rate):
 
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
-@pytest.mark.parametrize("lead", sparse_by_day([0.05, -9.0], 2, 1))
+@pytest.mark.by_day(2)
+@pytest.mark.parametrize("lead", [0.05, -9.0])
 @pytest.mark.parametrize("driver", [JointAngle, JointDisplacement, PointCoordinate])
 def test_screw_over_turns_is_helix(driver, lead, mirrored, engine, closing):
     """By either of its coordinates or a point, with a lead above and below one radian a metre."""
@@ -173,6 +174,7 @@ def test_driven_joint_closes_loop(mirrored, engine):
     )
 
 
+@pytest.mark.by_day(3)
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("bend", [0.0, 0.6, 1.5])
@@ -197,6 +199,7 @@ def test_constant_velocity_joint_over_turns(bend, mirrored, engine, closing):
         assert ("joint" in found.details["closures"]) == closing
 
 
+@pytest.mark.by_day(3)
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("rounding", [0.0, 8e-3])

@@ -67,6 +67,7 @@ def peg():
     return solved("mujoco", slider_crank(), CRANK_TURN, CRANK_RATE).points["peg"].position
 
 
+@pytest.mark.by_day(3)
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("name", ["pivot", "pin", "gudgeon", "guide", "glue"])

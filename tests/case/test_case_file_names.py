@@ -5,7 +5,6 @@ import re
 import pytest
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
-from kincheck.core.extensions.hardpoints.rubber import with_bushings
 
 from ..support.case_texts import BASE, INLINE, write
 
@@ -27,10 +26,3 @@ def test_singular_table_is_named(kind, tmp_path):
     for text in (f"[{kind}.a]\nb = 1\n", f"[{kind}]\nb = 1\n"):
         with pytest.raises(CaseError, match=f"{kind}: "):
             load(write(tmp_path, BASE + INLINE + text))
-
-
-def test_bushings_of_case_have_no_roles(tmp_path):
-    case = load(write(tmp_path, BASE + INLINE))
-    file = write(tmp_path, "[bushings.guide]\nstiffness = 1\n", "b.toml")
-    with pytest.raises(CaseError, match="bushings: unknown key, expected joints"):
-        with_bushings(case, file)

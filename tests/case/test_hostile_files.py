@@ -4,6 +4,7 @@ status 2, and opens nothing else.
 The bounds are the kernel's: a process that exceeds them is ended, and the test fails.
 """
 
+import importlib
 import json
 import os
 import subprocess
@@ -15,13 +16,16 @@ import pytest
 from kincheck.core.case.io.document import LONGEST_MESSAGE
 from kincheck.core.cli.main import main
 
+from ..support import hostile_texts
 from ..support.case_texts import CSV
-from ..support.hostile_texts import TEXTS, proved
 
 # A file of 4 MB, the largest that is read, takes some seconds to be parsed in Python and some
 # hundred bytes a character; what is refused for what it holds takes less. On a slow machine too, no
 # file needs ten times that.
 SECONDS, MEMORY = 60, 3 << 30
+TEXTS = dict(hostile_texts.TEXTS)
+for each in sorted(Path(__file__).parents[1].glob("extensions/*/hostile_texts.py")):
+    TEXTS |= importlib.import_module(f"tests.extensions.{each.parent.name}.{each.stem}").TEXTS
 TEMPLATE = ("--template", "double_wishbone")
 OPTIONS = {".csv": (*TEMPLATE, "--units", "mm", "--axes", "adams"), ".sub": TEMPLATE}
 
@@ -42,7 +46,7 @@ def folders(tmp_path_factory):
     (inside / "lines.csv").write_text("\n" * 2_000_001)
     (inside / "wide.csv").write_text(",".join(map(str, range(50_000))))
     (inside / "deep.json").write_text('{"a": ' + "[" * 1_000_000)
-    (inside / "words.json").write_text(proved("1_5"))
+    (inside / "words.json").write_text(hostile_texts.proved("1_5"))
     return inside, outside
 
 

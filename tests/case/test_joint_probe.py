@@ -36,6 +36,7 @@ def smallest_singular_value(case):
     return solve_closely(system, system.state(lanes), route.sampled(route.path.times)).sigma.min()
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", JOINTS + COUPLERS)
 def test_probe_is_well_conditioned(name):
     case = probe(TYPES[name])

@@ -10,14 +10,9 @@ from hypothesis import strategies as st
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.document import Section, fault
 from kincheck.core.case.io.lines import join, keys_of, line_of
-from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
-from kincheck.core.extensions.hardpoints.reader import read_hardpoints
-from kincheck.core.extensions.sweep.variation_file import read_variation
 
 from ..support.case_texts import edited, write
-from ..support.fakes import crank
-from ..support.model_files import driven
 from ..support.sources import ROOT
 
 NAMES = st.text("ab-_\" '#=]{}:,é\\", min_size=1, max_size=4).filter(lambda x: x == x.strip())
@@ -121,50 +116,6 @@ def test_planted_key_is_named(tmp_path, name):
         ) as found:
             load_case(write(tmp_path, planted))
         assert "case.toml" in str(found.value)
-
-
-BESIDE = {
-    "robot.yaml": "closed_loop: [[a, b],\n [a, zq]]\ntype: [3d, 3d] | line 2: closed_loop[1]",
-    "robot.yml": "pin_loops:\n- {parent: a}\n | line 2: pin_loops[0]: Object missing",
-    "robot.constraints.json": (
-        '{"schema": "kincheck-constraints/1",\n"constraints": [],\n"bodes": {}}'
-        " | line 3: bodes: unknown key, expected one of ... did you mean 'bodies'?"
-    ),
-}
-
-
-@pytest.mark.parametrize("name", BESIDE)
-def test_file_beside_robot_has_line(tmp_path, name):
-    if not name.endswith("json"):
-        pytest.importorskip("yaml")
-    text, _, said = BESIDE[name].partition(" | ")
-    robot = (
-        "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='continuous'>"
-        "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>"
-    )
-    write(tmp_path, text, name)
-    with pytest.raises(CaseError) as found:
-        load(write(tmp_path, robot, "robot.urdf"), driven("j:0:1:3"))
-    assert all(part in str(found.value) for part in (name, *said.split(" ... ")))
-
-
-@pytest.mark.parametrize("ending", ["json", "yaml"])
-@pytest.mark.parametrize("head", ["", '{"units": "mm",\n"points":'])
-def test_point_in_list_has_line(tmp_path, ending, head):
-    """Of a list of points, alone or in a table; YAML reads JSON."""
-    pytest.importorskip("yaml")
-    points = [{"name": f"p{k}", "x": 1, "y": 2, "z": "1e999" if k == 2 else 3} for k in range(4)]
-    text = f"{head}\n{json.dumps(points, indent=0)}{'}' * bool(head)}"
-    line = line_with(text, "1e999")
-    said = rf"line {line}: (points)?\[2\]\.z \((points\.)?p2\.z\): found '1e999'"
-    with pytest.raises(CaseError, match=said):
-        read_hardpoints(write(tmp_path, text, f"points.{ending}"))
-
-
-def test_variation_is_named_with_line(tmp_path):
-    text = 'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.tip]\nsigmma = 1\n'
-    with pytest.raises(CaseError, match=r"vary\.toml: line 4: hardpoints\.tip\.sigmma: "):
-        read_variation(write(tmp_path, text, "vary.toml"), crank())
 
 
 def test_key_twice_is_named_with_line(tmp_path):

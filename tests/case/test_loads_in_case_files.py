@@ -16,9 +16,6 @@ from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.errors import CaseError
-from kincheck.core.extensions.explain.diagnose import diagnose
-from kincheck.core.extensions.explain.text import print_diagnosis
-from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.forces import Multipliers
 from kincheck.core.harness.run import run
 from kincheck.core.kinematics import NativeSolver, solve
@@ -27,7 +24,6 @@ from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSp
 from kincheck.core.report.terminal import console
 
 from ..oracles import naive
-from ..support.by_night import sparse_by_day
 from ..support.case_texts import complains, edited, write
 from ..support.engine_forces import Beside, every_force, force_case, values
 from ..support.four_bar_within_digits import solved, truth, written
@@ -300,9 +296,8 @@ def test_exact_axes_give_true_forces(tmp_path):
     within(found, 0.0)
 
 
-@pytest.mark.parametrize(
-    "rounding", sparse_by_day(product("abcd", [0, 2], [1e-6, 1e-5, 1e-4]), 5), ids=str
-)
+@pytest.mark.by_day(5)
+@pytest.mark.parametrize("rounding", [*product("abcd", [0, 2], [1e-6, 1e-5, 1e-4])], ids=str)
 def test_rounded_axis_gives_true_forces(tmp_path, rounding):
     hinge, axis, digits = rounding
     file = rounded(tmp_path, {hinge: off_by(digits, axis)}, **closing(2.0 * digits))
@@ -311,6 +306,7 @@ def test_rounded_axis_gives_true_forces(tmp_path, rounding):
     within(found, digits)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     "more",
     [
@@ -451,6 +447,8 @@ def test_carrying_joints_keep_their_rows(tmp_path):
 
 
 def test_explain_names_redundant_rows(tmp_path):
+    print_diagnosis = pytest.importorskip("kincheck.core.extensions.explain.text").print_diagnosis
+    diagnose = pytest.importorskip("kincheck.core.extensions.explain.diagnose").diagnose
     file = rounded(tmp_path)
     found = diagnose(load_case(file), samples=3, tol=1e-12)
     assert [each.row.owner for each in found.redundant] == ["d"] * 3
@@ -471,6 +469,9 @@ def test_explain_names_redundant_rows(tmp_path):
 
 
 def test_proof_omits_undetermined_components(tmp_path):
+    prove_case = pytest.importorskip(
+        "kincheck.core.extensions.proofs.verified_reference"
+    ).prove_case
     pytest.importorskip("flint")
     file = rounded(tmp_path)
     case = load_case(file)

@@ -446,6 +446,7 @@ def rounded(folder, form, grid, shifts):
     return judged(load_case(write(folder, text)))
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(("form", "decimals", "digits"), WRITERS.values(), ids=WRITERS)
 def test_rightly_rounded_curve_passes(form, decimals, digits, tmp_path):
     """And one that is off by a whole unit of a last digit fails, in one row or in all."""

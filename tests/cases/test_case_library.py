@@ -25,8 +25,6 @@ from kincheck.cases.jet import Jet, steady
 from kincheck.cases.vectors import Circle
 from kincheck.core import Body, CaseError, Distance, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core.case.case import Output, Truth, without_forces
-from kincheck.core.extensions.laboratory.truth.forces import known_forces
-from kincheck.core.extensions.laboratory.truth.motion import follow_motion
 from kincheck.core.harness.compare import deviations, output_series
 
 from ..support.fakes import swept
@@ -96,6 +94,7 @@ def off(case, name, found, reference):
     return max(each.max_abs / each.tolerance for _, each in against.items() if each)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", CASES)
 def test_native_engine_equals_case_truth(name):
     case, found = solved(name)
@@ -349,6 +348,12 @@ def test_loaded_strut_moves_as_strut():
 
 
 def test_loaded_strut_file_equals_force_truth():
+    follow_motion = pytest.importorskip(
+        "kincheck.core.extensions.laboratory.truth.motion"
+    ).follow_motion
+    known_forces = pytest.importorskip(
+        "kincheck.core.extensions.laboratory.truth.forces"
+    ).known_forces
     case = CASES["mcpherson_strut_loaded"]
     few = swept(case, case.sweep.values[::8])
     known = known_forces(few, follow_motion(few))

@@ -87,6 +87,7 @@ def solved(case, engine="native"):
     return found
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
 def test_driven_case_engines_agree(case, engine):
     if adapters.engine(engine).version() is None:

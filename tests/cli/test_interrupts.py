@@ -115,6 +115,7 @@ def test_interrupt_while_writing_completes_files(tmp_path, number):
     assert "1 pass" in out
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("seconds", [0.3, 0.7, 1.4])
 def test_interrupt_of_run_at_any_time(tmp_path, seconds):
     """From when Python has begun to the end of the run, workers and history included."""

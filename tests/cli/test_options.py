@@ -5,11 +5,11 @@ anything is computed.
 import kincheck
 import pytest
 from kincheck.core.case.io.atomic_files import unwritable
-from kincheck.core.cli.main import main
-from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+from kincheck.core.cli.main import every_command, main
 
-from ..support.case_texts import rows
+from ..support.case_texts import at_hand, rows
 
+COMMANDS = every_command()
 VARY = """
 schema = "kincheck-vary/1"
 mode = "monte_carlo"
@@ -37,7 +37,6 @@ stress --family units --tol 1e-12
 run rssr --memory 1e300 | argument --memory: '1e300' is too large. Give 1e+09 at most.
 run rssr --timeout 2e9 | argument --timeout: '2e9' is too large. Give 1e+09 at most.
 run rssr --out= | argument --out: found an empty name; give one, or leave it out
-run car.csv --reactions | Write a case file, kincheck import TABLE > case.toml, and there
 run --joints rssr --reactions | --reactions: the loops of --joints have no masses
 kc rssr --travel -60mm:60mm:5 | rssr: no point is the wheel's centre
 export rssr --at -3degg --to mjcf | '-3degg' is not a number with one of the units
@@ -109,11 +108,10 @@ def here(tmp_path, monkeypatch):
     (tmp_path / "link").symlink_to("a")
     (tmp_path / "no").mkdir()
     (tmp_path / "vary.toml").write_text(VARY)
-    (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]))
     return tmp_path
 
 
-@pytest.mark.parametrize(("line", "said"), rows(REFUSED, named=False))
+@pytest.mark.parametrize(("line", "said"), at_hand(rows(REFUSED, named=False), COMMANDS))
 def test_invalid_command_lines_are_refused(line, said, here, capsys):
     assert main(line.split()) == 2
     out, err = capsys.readouterr()
@@ -134,7 +132,9 @@ def test_option_abbreviation_is_unique_prefix(capsys):
     assert "ambiguous option: --re could match --reference, --require" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("line", "option", "other"), rows(ONE_FILE, named=False))
+@pytest.mark.parametrize(
+    ("line", "option", "other"), at_hand(rows(ONE_FILE, named=False), COMMANDS)
+)
 def test_shared_output_file_is_refused(line, option, other, here, capsys):
     assert main(line.split()) == 2
     out, err = capsys.readouterr()

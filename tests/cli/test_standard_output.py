@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 from kincheck.core.harness.record import from_json
 
-from ..support.by_night import sparse_by_day
-
 ROOT = Path(__file__).parents[2]
 KINCHECK = "import sys; from tests.support.fake_command import main; sys.exit(main())"
 RUN = "run first --engine native --jobs 0"
@@ -25,7 +23,8 @@ def kincheck(line, out=subprocess.PIPE, **env):
     )
 
 
-@pytest.mark.parametrize("encoding", sparse_by_day(["utf-16", "ascii"], 2))
+@pytest.mark.by_day(2)
+@pytest.mark.parametrize("encoding", ["utf-16", "ascii"])
 def test_run_output_in_limited_encodings(encoding):
     done = kincheck(RUN, PYTHONIOENCODING=encoding)
     assert done.returncode == 0, done.stderr

@@ -49,6 +49,7 @@ def job(tmp_path):
     return job
 
 
+@pytest.mark.nightly
 def test_github_action_fails_after_regression(job, tmp_path):
     file = tmp_path / "slider.toml"
     file.write_text(BASE + INLINE)

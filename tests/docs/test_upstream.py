@@ -7,7 +7,6 @@ import subprocess
 import sys
 
 import pytest
-from kincheck.core.extensions.environments.environments import python_of
 
 from ..support.sources import ROOT
 
@@ -40,6 +39,7 @@ def test_mujoco_connect_has_acceleration_term():
 
 
 def test_mjx_connect_lacks_acceleration_term():
+    python_of = pytest.importorskip("kincheck.core.extensions.environments.environments").python_of
     if (python := python_of("mjx")) == sys.executable:
         pytest.skip("MJX has no environment of its own here")
     found = [CONNECTS.match(line) for line in printed("mjx_connect_weld", "mujoco", python)]

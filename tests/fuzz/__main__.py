@@ -11,7 +11,6 @@ build/fuzz/NAME.crashes:
 import argparse
 import importlib
 import os
-import pkgutil
 import random
 import sys
 from collections.abc import Sequence
@@ -20,17 +19,13 @@ from typing import Any
 
 from kincheck import core
 
-from .keeping import keep, kept
+from .keeping import READERS, fuzzer, keep, kept
 
 # Before numpy is there: small matrices gain nothing by threads, which on a busy machine wait for
 # each other as in a hang.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 HERE = Path(__file__).parent
 BUILD = HERE.parent.parent / "build" / "fuzz"
-READERS = sorted(
-    {each.name for each in pkgutil.iter_modules([str(HERE)])}
-    - {"__main__", "fuzzing", "keeping", "trees"}
-)
 # Bounds of one input: far above what any of these small ones needs, also on a busy machine.
 SECONDS, MEGABYTES = 20, 2048
 # Where half of the changes keep the document's form, the other half are free to break it.
@@ -46,7 +41,7 @@ def main(argv: Sequence[str]) -> int:
     )
     parser.add_argument("reader", choices=READERS)
     parser.add_argument("--seconds", type=int, default=60)
-    parser.add_argument("--keep", action="store_true", help="in tests/data/fuzz")
+    parser.add_argument("--keep", action="store_true", help="beside the fuzzer")
     parser.add_argument("input", nargs="*", type=Path, help="these only, without the fuzzer")
     options = parser.parse_intermixed_args(argv)
     if options.input:
@@ -54,7 +49,7 @@ def main(argv: Sequence[str]) -> int:
         if options.keep:
             keep(f"{options.reader}.defects", [*kept(f"{options.reader}.defects"), *inputs])
         for each in inputs:
-            importlib.import_module(f"tests.fuzz.{options.reader}").one(each)
+            fuzzer(options.reader).one(each)
         return 0
     corpus = BUILD / options.reader
     crashes = BUILD / f"{options.reader}.crashes"
@@ -73,7 +68,7 @@ def main(argv: Sequence[str]) -> int:
 def minimal(name: str, corpus: Path) -> list[bytes]:
     """Inputs that together take every step from line to line that all take, the short ones first.
     (libFuzzer's own merge starts its program anew, which Python is not.)"""
-    reader = importlib.import_module(f"tests.fuzz.{name}")
+    reader = fuzzer(name)
     here = str(Path(str(core.__file__)).parent)  # as it is imported: not always this folder
     inputs = [*reader.seeds(), *(file.read_bytes() for file in corpus.iterdir())]
     steps: set[tuple[Any, int, int]] = set()
@@ -109,7 +104,7 @@ def fuzz(name: str, arguments: Sequence[str]) -> int:
     """Hand over to libFuzzer, which ends the process."""
     atheris: Any = importlib.import_module("atheris")
     with atheris.instrument_imports(include=["kincheck"]):
-        reader = importlib.import_module(f"tests.fuzz.{name}")
+        reader = fuzzer(name)
         for seed in reader.seeds():  # what is imported on use is imported now, and watched
             reader.one(seed)
     corpus = BUILD / name

@@ -4,9 +4,9 @@ import kincheck.cases
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.document import fault
 from kincheck.core.case.io.mechanism_sections import DRIVERS
+from kincheck.core.case.io.sections import sections
 from kincheck.core.case.measures import Measure
 from kincheck.core.errors import KincheckError
-from kincheck.core.extensions.hardpoints.suspension import SuspensionOutput
 from kincheck.core.joints import Coupler, Joint
 from kincheck.core.kinematics import require_driven
 from kincheck.core.mechanism.motions import Motion
@@ -29,7 +29,7 @@ TYPES = [
     *DRIVERS,
     *Motion.types(),
     *Measure.registry,
-    *SuspensionOutput.registry,
+    *(name for section in sections() for name in section.types),
 ]
 WORDS = (*KEYS.split(), *TYPES)
 
@@ -53,7 +53,7 @@ def seeds() -> list[bytes]:
     """The built-in cases without the files beside them, and one with a reference inside."""
     texts = [
         file.read_text().partition("[reference]")[0]
-        for file in sorted(kincheck.cases.FOLDER.glob("*.toml"))
+        for file in map(kincheck.cases.file, kincheck.cases.names())
     ]
     return [text.encode() for text in (BASE + INLINE, *texts)]
 

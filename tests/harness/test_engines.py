@@ -43,6 +43,7 @@ def record(case, name):
     return record_of(engine(name), case)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", adapters.ENGINES)
 @pytest.mark.parametrize("case", ["four_bar", "rssr", "spatial_slider_crank"])
 def test_closed_forms_over_full_turn(case, name):

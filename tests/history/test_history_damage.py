@@ -69,6 +69,7 @@ HELD = []
 WHOLE_FILE = [directory, no_database, of_another_program, of_a_later_version, cut_off, locked, full]
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("fault", WHOLE_FILE)
 def test_unusable_history_costs_no_result(
     kincheck_main, path, tmp_path, capsys, monkeypatch, fault
@@ -177,6 +178,7 @@ def passed_over(capsys, path):
     return told
 
 
+@pytest.mark.by_day(2)
 def test_run_beside_damaged_run_is_stored(kincheck_main, damaged, tmp_path, capsys):
     out = tmp_path / "out"
     assert kincheck_main("run crank --history", damaged, "--out", out) == 2

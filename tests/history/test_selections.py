@@ -75,6 +75,7 @@ def test_unlike_selection_breaks_nothing(run, report):
     assert report()[0] == 0
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("again", "status"),
     [

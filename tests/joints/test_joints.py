@@ -165,6 +165,7 @@ def threaded(example):
     return len(getattr(example.joint, "relations", ()))
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", TYPES)
 def test_joint_rows_span_paper_rows(name, seed):

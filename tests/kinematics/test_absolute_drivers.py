@@ -16,13 +16,13 @@ from kincheck.core import (
     Revolute,
     SolveError,
     solve,
-    solve_designs,
 )
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.extensions.explain.diagnose import diagnose
 from kincheck.core.mechanism.motions import Absolute, Ramp, Sine
 
 from ..support.mechanisms import Z
+
+DESIGNS = "kincheck.core.extensions.designs.design_batch"
 
 ARM = Mechanism(
     "arm",
@@ -82,6 +82,7 @@ def test_absolute_motion_of_second_driver():
 
 
 def test_designs_moving_driven_point_are_refused():
+    solve_designs = pytest.importorskip(DESIGNS).solve_designs
     at = {"points.tip.position": np.array([[0.8, 0.6, 0.0], [0.8, 0.5, 0.0]])}
     with pytest.raises(
         SolveError,
@@ -99,6 +100,7 @@ def test_sensitivity_of_absolute_and_relative_drivers():
     """x = sqrt(X^2 + Y^2 - y^2): by Y it is Y / x, at a height that is given; relative, it moves
     along: (Y - y) / x.
     """
+    diagnose = pytest.importorskip("kincheck.core.extensions.explain.diagnose").diagnose
     outputs = tuple(
         Output(name, "tip", along, False, 1e-9, 0.0, "test")
         for name, along in (("x", (1, 0, 0)), ("y", (0, 1, 0)))

@@ -15,7 +15,6 @@ from kincheck.core import (
 )
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, cross, turned_by
-from kincheck.core.extensions.laboratory.paper.rows import LockTest, PaperDot12
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
@@ -48,12 +47,6 @@ def test_dot12_has_no_spurious_zeros(turn):
     )
     assert wrong <= 1e-15
     assert np.linalg.norm(p.Dot12().phi(GROUND_POSE, Pose.of(ZERO, turn))) > 1.7
-
-
-@pytest.mark.parametrize("style", [PaperDot12(), LockTest(Y, Z)], ids=["paper", "lock"])
-def test_branch_of_spurious_zeros(style):
-    assert all(style.branch(GROUND_POSE, Pose.of(ZERO, turn))[0] < 0.0 for turn in SPURIOUS)
-    assert style.branch(GROUND_POSE, Pose.of(ZERO, rotation(X, 0.5)))[0] > 0.0
 
 
 def transposed(body):

@@ -14,8 +14,6 @@ from kincheck.core.algebra import ZERO, Quat, vec
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.doors import offers
 from kincheck.core.errors import KincheckError, MechanismError
-from kincheck.core.extensions.exports.command import writer_of
-from kincheck.core.extensions.exports.model_writer import written
 from kincheck.core.kinematics.forces.equations import BodyStates, bushing, force_of
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.mechanism.body import Body
@@ -180,6 +178,8 @@ def test_bushing_on_unknown_body_is_refused():
 
 @pytest.mark.parametrize("target", offers("writers"))
 def test_writers_name_omitted_bushings_and_curves(tmp_path, target):
+    written = pytest.importorskip("kincheck.core.extensions.exports.model_writer").written
+    writer_of = pytest.importorskip("kincheck.core.extensions.exports.command").writer_of
     case = bushed(tmp_path, "cardan")
     text = "".join(map(str, written(case, writer_of(target)).values()))
     assert re.search(r"Left out:[^\n]*force 'b' \(bushing\)[^\n]*force 's'", text)

@@ -10,25 +10,24 @@ from weakref import WeakSet
 
 import numpy as np
 import pytest
-from kincheck.core import Spherical, Supplied, solve, solve_designs
+from kincheck.core import Spherical, Supplied, solve
 from kincheck.core.caches import KEYS, ThreadCache, cache_last, clear_caches
 from kincheck.core.case import quantity
 from kincheck.core.case.models.files import load
 from kincheck.core.case.quantity import Output
-from kincheck.core.extensions.blocks import component_lanes, sparse_lanes
-from kincheck.core.extensions.blocks import sweep as block_sweep
-from kincheck.core.extensions.hardpoints.suspension import base, wheel
-from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
-from kincheck.core.extensions.laboratory.bench.size import circle
 from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled import routes as samples
 from kincheck.core.kinematics.compiled.compiled_model import source_files
 from kincheck.core.kinematics.compiled.request import Request, WantedOutput
 from kincheck.core.kinematics.continuation import walk
+from kincheck.core.kinematics.formulation.parameters import every_place, placed
 from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
+from kincheck.core.program.executor import compiler
 
 from ..support.mechanisms import chain, mcpherson, solve_all
+
+DESIGNS = "kincheck.core.extensions.designs.design_batch"
 
 STROKES = np.linspace(-0.05, 0.05, 21)
 
@@ -66,6 +65,7 @@ def test_model_cache_of_equal_requests(made):
 
 
 def test_model_cache_of_designs(made):
+    solve_designs = pytest.importorskip(DESIGNS).solve_designs
     place = "points.wheel.position"
     values = {place: np.array([mcpherson().point("wheel").position, (0.1, 0.7, 0.3)])}
     first, again = (
@@ -86,7 +86,8 @@ def test_model_cache_is_shared_by_threads():
 @pytest.fixture
 def swept(monkeypatch):
     """Paths through components."""
-    return calls(monkeypatch, block_sweep.BlockSweep, "__init__")
+    blocks = pytest.importorskip("kincheck.core.extensions.blocks.sweep")
+    return calls(monkeypatch, blocks.BlockSweep, "__init__")
 
 
 def test_cache_keeps_last_path_of_chain(swept):
@@ -113,21 +114,21 @@ def test_path_cache_is_per_thread(swept):
 
 @pytest.mark.usefixtures("own_joint_types")
 @pytest.mark.parametrize(
-    ("mechanism", "owner", "name"),
+    ("mechanism", "module", "name"),
     [
-        (mcpherson(), compiled_model, "compile_model"),
-        (chain(21), component_lanes.ComponentLanes, "__init__"),
+        (mcpherson(), compiled_model.__name__, "compile_model"),
+        (chain(21), "kincheck.core.extensions.blocks.method", "ComponentLanes"),
     ],
     ids=["one program", "components"],
 )
-def test_user_joints_are_not_cached(mechanism, owner, name, monkeypatch):
+def test_user_joints_are_not_cached(mechanism, module, name, monkeypatch):
     """They may be equal, and yet not mean the same."""
 
     @dataclass(frozen=True)
     class Ball(Spherical):
         type = "ball_of_mine"
 
-    built = calls(monkeypatch, owner, name)
+    built = calls(monkeypatch, pytest.importorskip(module), name)
     joints = [
         Ball(j.name, *j.bodies, j.point) if type(j) is Spherical else j for j in mechanism.joints
     ]
@@ -200,31 +201,6 @@ def test_very_long_route_is_not_cached(bound):
     for number in (1, 2):
         solve(mcpherson(), "stroke", strokes)
         assert len(bound) == number
-
-
-@pytest.mark.parametrize(
-    ("large", "kind"),
-    [
-        (chain(21), component_lanes.ComponentLanes),
-        (circle(22).mechanism, sparse_lanes.SparseLanes),
-    ],
-    ids=["components", "sparse"],
-)
-def test_cache_keeps_last_large_mechanism(large, kind, monkeypatch):
-    made = calls(monkeypatch, kind, "__init__")
-    values, driver = np.linspace(-0.1, 0.2, 9), large.drivers[0].name
-    first = solve(large, driver, values).points
-    other = solve(large, driver, values[::2]).points
-    again = solve(large, driver, values).points
-    assert len(made) == 1
-    for name, motion in first.items():
-        np.testing.assert_array_equal(again[name].acceleration, motion.acceleration)
-        # predicted from other samples: round-off, by the condition and once more for each
-        # derivative
-        assert np.abs(other[name].acceleration - motion.acceleration[::2]).max() <= 1e-10
-    with ThreadPoolExecutor(1) as threads:
-        threads.submit(solve, large, driver, values).result()
-    assert len(made) == 2
 
 
 def test_clear_caches_drops_models(made):
@@ -374,11 +350,37 @@ def test_program_cache_key_covers_equations(tmp_path, monkeypatch):
     assert str(pathlib.Path(quantity.__file__).parent) in folders
 
 
+def test_new_numbers_need_no_new_trace(tmp_path, monkeypatch):
+    """Programs of varied places serve any numbers there: those found again equal those traced."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    traced, place = calls(monkeypatch, compiled_model, "_trace"), "joints.ball.point"
+    request = Request(("stroke",), ("wheel",), varied=("joints.lca_pivot.axis", place))
+
+    def moved(name, by):
+        mechanism = mcpherson()
+        x, y, z = every_place(mechanism)[name]
+        return placed(mechanism, {name: (x + by, y, z)})
+
+    compiled_model.load_or_trace(mcpherson(), request)
+    found = compiled_model.load_or_trace(moved(place, 1e-3), request)
+    assert len(traced) == 1
+    fresh = compiled_model._trace(moved(place, 1e-3), request, None, compiler().width)
+    assert repr(found.plan.programs) == repr(fresh.plan.programs)
+    assert found.selection.chosen == fresh.selection.chosen
+    assert (found.varied, found.frame, found.rows) == (fresh.varied, fresh.frame, fresh.rows)
+    assert {name: tuple(x) for name, x in found.state.items()} == fresh.state
+    # its numbers are in the programs
+    compiled_model.load_or_trace(moved("points.wheel.position", 1e-3), request)
+    assert len(traced) == 3
+
+
 def test_modules_of_suspension_outputs(tmp_path):
     """Those of an output that another one is made of, too: the slope by travel of toe."""
+    suspension = "kincheck.core.extensions.hardpoints.suspension"
+    templates = pytest.importorskip("kincheck.core.extensions.hardpoints.templates")
     file = tmp_path / "car.csv"
-    file.write_text(sample_table(TEMPLATES["double_wishbone"]))
+    file.write_text(templates.sample_table(templates.TEMPLATES["double_wishbone"]))
     case = load(file, Supplied(travel="0.02:3"))
     (slope,) = [each for each in case.outputs if each.name == "toe.per_travel"]
     found = compiled_model.modules_of([WantedOutput(slope)])
-    assert {wheel.__name__, base.__name__, quantity.__name__} <= found
+    assert {f"{suspension}.wheel", f"{suspension}.base", quantity.__name__} <= found

@@ -65,6 +65,7 @@ def latin(rows, columns, others):
     ]
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     ("beside", "count", "loops"),
     latin([1e-2, 1e-3, -1e-4, 1e-5, -3e-6], [2, 3, 8, 400], [1, 2]),
@@ -93,6 +94,7 @@ def test_narrow_corner_ends_motion(beside, loops):
 # Crank and pivots in line, the pin two metres from the rocker's pivot: rod and rocker are too short
 # to reach it by this. Of two loops alike the determinants change their signs together, and that of
 # the whole keeps it.
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     ("short", "count", "loops"), latin([1e-2, 1e-5, 1e-8, 1e-10], [2, 5, 9, 300], [1, 2])
 )
@@ -117,6 +119,7 @@ COUNTS = [2, 3, 5, 9, 300]
 
 
 # every kite with two or three of the counts
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     ("ground", "short", "start", "count"),
     [(*kite, count) for k, kite in enumerate(KITES) for count in COUNTS[k % 2 :: 2]],
@@ -235,6 +238,7 @@ CHOSEN = [
 ]
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(("name", "ends", "style"), CHOSEN)
 def test_chosen_rows_do_not_hide_corner(name, ends, style):
     """A determinant of rows chosen from more changes its sign by a singular pose, and by one of the
@@ -267,6 +271,7 @@ def test_nearly_singular_kite_exchanges_rows(ends, beside, style):
 
 
 # every count with the native style and another one
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     ("count", "style"),
     [

@@ -43,6 +43,7 @@ def large(mechanism):
     )
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", cases.names())
 def test_sparse_freedom_count_equals_dense(name):
     mechanism = cases.load(name).mechanism

@@ -214,6 +214,7 @@ def assert_same(found, expected, limits=NATIVE):
     )
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("engine", adapters.ENGINES)
 @pytest.mark.parametrize("variant", [*STRUTS, ALL], ids=str)
 def test_strut_motion_of_equivalent_joints(variant, engine):
@@ -221,6 +222,7 @@ def test_strut_motion_of_equivalent_joints(variant, engine):
     assert_same(motion(mechanism, STROKES, engine), motion(mcpherson(), STROKES), LIMITS[engine])
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("engine", adapters.ENGINES)
 @pytest.mark.parametrize("variant", FOUR_BARS)
 def test_four_bar_motion_of_equivalent_joints(variant, engine):

@@ -13,7 +13,6 @@ from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.measures import Component, Orientation
 from kincheck.core.case.measures import JointAngle as Angle
 from kincheck.core.case.quantity import with_markers
-from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
@@ -33,7 +32,6 @@ from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Path, Ramp, Sine
 
-from ..support.by_night import sparse_by_day
 from ..support.mechanisms import X, Z
 
 BEND = 0.8  # cosine of the angle between the shafts
@@ -280,7 +278,8 @@ def test_orientation_from_offset_start(start):
 
 
 @pytest.mark.parametrize("name", [name for name in adapters.ENGINES if name != "native"])
-@pytest.mark.parametrize("steps", sparse_by_day([3, 4, 8, 25], 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("steps", [3, 4, 8, 25])
 def test_orientations_agree_in_all_engines(steps, name):
     """Half and whole turns are among the samples."""
     tested = adapters.engine(name)
@@ -295,6 +294,9 @@ def test_orientations_agree_in_all_engines(steps, name):
 
 
 def test_proved_orientations_follow_turns():
+    prove_case = pytest.importorskip(
+        "kincheck.core.extensions.proofs.verified_reference"
+    ).prove_case
     pytest.importorskip("flint")
     values = [0.5, 4.0, 8.0]
     of = replace(swept(values), outputs=tuple(OUTPUTS[7:14]))

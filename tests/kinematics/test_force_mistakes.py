@@ -126,6 +126,7 @@ def test_force_balance_without_mistake(solve):
     assert max(worst(mechanism, case, solve)) <= 1e-11
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("solve", [solved, traced])
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_force_balance_finds_planted_mistake(mistake, solve, monkeypatch):

@@ -26,7 +26,6 @@ from kincheck.core.kinematics.structure.redundancy import independent_rows
 from kincheck.core.mechanism.mechanism import GROUND
 from kincheck.core.primitives import Drive, Ground, Twist
 
-from ..support.by_night import sparse_by_day
 from ..support.mechanisms import mcpherson
 from .test_freedom import jacobian
 
@@ -86,7 +85,8 @@ PROBES = {case.name for case in probes()}
 STYLES = {name: OTHERS if name in PROBES else OTHERS[-1:] for name in CASES}
 
 
-@pytest.mark.parametrize("name", sparse_by_day(CASES, 2))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("name", CASES)
 def test_case_motion_in_row_styles(name):
     reference = run(CASES[name], NATIVE)
     # a hundred roundings, divided by the smallest singular value once for positions, and once more

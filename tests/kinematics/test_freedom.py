@@ -22,7 +22,6 @@ from kincheck.core import (
     Translational,
     Universal,
 )
-from kincheck.core.extensions.explain.rank import free_motions
 from kincheck.core.failures import FailureKind
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.one_design import solve
@@ -250,13 +249,3 @@ def test_locked_driver_names_its_joints(style):
     )
     with pytest.raises(SolveError, match=said):
         solve(pushed, "push", [0.0], style=style)
-
-
-def test_free_motions_are_reported_separately():
-    """Three motions of two columns each, in a null space whose orthonormal basis mixes them."""
-    rng = np.random.default_rng(7)
-    apart = np.kron(np.eye(3), [[1.0, -1.0]])  # each row ties two columns together
-    found = free_motions(rng.normal(size=(3, 3)) @ apart)
-    assert found.shape == (3, 6)
-    assert np.abs(apart @ found.T).max() <= 1e-14
-    assert ((np.abs(found) > 1e-12).sum(axis=1) == 2).all()

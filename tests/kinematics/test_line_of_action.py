@@ -12,7 +12,6 @@ from kincheck.core.joints import Cylindrical, Planar, Revolute, Screw, Translati
 from kincheck.core.joints.base import AxialJoint, triad
 from kincheck.core.kinematics import NativeSolver, styles, with_forces
 
-from ..support.by_night import sparse_by_day
 from ..support.driven_chains import COUPLINGS, SLOW, Link, chain, deviation, pushed_slide
 
 # Of the largest force or moment: some hundred operations, over a smallest singular value of 0.1,
@@ -43,7 +42,8 @@ def native(made, style="native"):
     ids=["moving", "at rest", "metres and more than a turn"],
 )
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-@pytest.mark.parametrize("kind", sparse_by_day(KINDS, 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("kind", KINDS)
 def test_forces_of_driven_joint_on_ground(kind, flipped, motion):
     made = chain([replace(KINDS[kind], flipped=flipped), HINGE], **motion)
     assert deviation(made, native(made)) < ROUND_OFF
@@ -51,7 +51,8 @@ def test_forces_of_driven_joint_on_ground(kind, flipped, motion):
 
 @pytest.mark.parametrize("slow", [1.0, SLOW], ids=["moving", "at rest"])
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-@pytest.mark.parametrize("kind", sparse_by_day((kind for kind in KINDS if kind != "planar"), 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "planar"])
 def test_forces_of_driven_joint_between_bodies(kind, flipped, slow):
     link = replace(KINDS[kind], flipped=flipped)
     made = chain([replace(HINGE, flipped=not flipped), link, HINGE], slow=slow)
@@ -60,7 +61,8 @@ def test_forces_of_driven_joint_between_bodies(kind, flipped, slow):
 
 @pytest.mark.parametrize("other_end", [False, True], ids=["", "driven from its other end"])
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-@pytest.mark.parametrize("name", sparse_by_day(COUPLINGS, 8))
+@pytest.mark.by_day(8)
+@pytest.mark.parametrize("name", COUPLINGS)
 def test_forces_of_coupled_joints(name, flipped, other_end):
     one, other, coupling = COUPLINGS[name]
     links = [HINGE, replace(one, flipped=flipped), replace(other, flipped=not flipped)]
@@ -76,6 +78,7 @@ def test_forces_of_pushed_point(kind, flipped):
     assert deviation(made, native(made)) < ROUND_OFF
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("style", styles())
 @pytest.mark.parametrize("kind", ["translational", "screw, by its slide"])
 def test_line_of_action_in_row_styles(kind, style):

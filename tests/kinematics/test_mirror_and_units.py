@@ -56,6 +56,7 @@ def test_mirrored_strut_in_every_engine(engine):
     assert_same(found * (1.0, -1.0, 1.0), motion(mcpherson(), STROKES), LIMITS[engine])
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("case", probes(), ids=lambda each: each.name)
 def test_mirrored_joints(case):
     """A turn backwards: the velocity changes its sign once more."""

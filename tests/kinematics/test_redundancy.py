@@ -6,12 +6,6 @@ import numpy as np
 import pytest
 from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core.algebra import ZERO, Quat, vec
-from kincheck.core.extensions.laboratory.stress.families.linkages import (
-    add_loop,
-    any_plane,
-    crank_rocker,
-    four_bar,
-)
 from kincheck.core.kinematics.compiled.programs import Tracer
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
@@ -63,9 +57,12 @@ def test_redundant_rows_of_loops_sharing_crank(seed):
     """Each loop keeps a system of its own: of hinges alone three of its rows are left out, and they
     are none of the crank's.
     """
+    linkages = pytest.importorskip("kincheck.core.extensions.laboratory.stress.families.linkages")
     rng = np.random.default_rng(seed)
-    plane, bars = any_plane(rng), crank_rocker(rng)
-    mechanism, _ = add_loop(four_bar(plane, *bars), plane, *bars, "revolutes", "twin ")
+    plane, bars = linkages.any_plane(rng), linkages.crank_rocker(rng)
+    mechanism, _ = linkages.add_loop(
+        linkages.four_bar(plane, *bars), plane, *bars, "revolutes", "twin "
+    )
     frame = frames(mechanism)
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     selection = select_rows(mechanism, frame, formulation)
@@ -84,9 +81,10 @@ def test_kept_rows_are_good_all_round(seed):
     """Against the best there is, all rows. Where one row each of two hinges kept an axis parallel
     there were poses without rank.
     """
+    linkages = pytest.importorskip("kincheck.core.extensions.laboratory.stress.families.linkages")
     rng = np.random.default_rng(seed)
-    plane, bars = any_plane(rng), crank_rocker(rng)
-    mechanism, motion = four_bar(plane, *bars)
+    plane, bars = linkages.any_plane(rng), linkages.crank_rocker(rng)
+    mechanism, motion = linkages.four_bar(plane, *bars)
     frame = frames(mechanism)
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     kept = select_rows(mechanism, frame, formulation).chosen

@@ -10,7 +10,6 @@ from kincheck import cases
 from kincheck.cases import bennett
 from kincheck.cases.jet import Jet
 from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, Universal
-from kincheck.core.extensions.explain.conditioning import conditioning
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import SIGMA, Request
 from kincheck.core.kinematics.compiled.routes import Route
@@ -124,22 +123,7 @@ def test_bifurcation_after_row_exchange(first, turn):
     assert [pose["kind"] for pose in found.details["singular_poses"]] == ["bifurcation"]
 
 
-def test_conditioning_orientation_over_bifurcation():
-    turn = np.linspace(0.0, 3.0, 31)
-    found = conditioning(chain(1), Path({"turn": Ramp(1.0)}, turn), turn, ["end"], {}, 31, 1e-12)
-    assert [pose.orientation for pose in found.poses] == [
-        1.0 if value < BRANCH else -1.0 for value in turn
-    ]
-
-
-def test_conditioning_at_dependent_rows():
-    turn = np.linspace(0.0, 2.0 * np.pi, 41)
-    found = conditioning(loop(), Path({"turn": Ramp(1.0)}, turn), turn, ["tracer"], {}, 41, 1e-12)
-    assert [pose.orientation for pose in found.poses] == [1.0] * 41
-    assert min(pose.smallest for pose in found.poses) > 0.03
-    assert len({tuple(pose.owners) for pose in found.poses}) > 1
-
-
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("style", "off"),
     [

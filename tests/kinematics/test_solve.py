@@ -145,6 +145,7 @@ WRITTEN = [
 ]
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(("name", "write", "style"), WRITTEN)
 def test_paper_equations_hold(name, write, style):
     """Residuals of all joints at the solved poses, and their first two derivatives by time along r,

@@ -22,12 +22,7 @@ from kincheck.core import (
     Translational,
     solve,
 )
-from kincheck.core import solve_designs as designs
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.extensions.exports.model_writer import way_to
-from kincheck.core.extensions.proofs.verified_reference import prove_case
-from kincheck.core.extensions.sweep.sweep import sweep_designs
-from kincheck.core.extensions.sweep.variation_file import read_variation
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import start_of
 from kincheck.core.kinematics.formulation.styles import styles
@@ -36,6 +31,8 @@ from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
 
 from ..support.block_structures import solve_components, solve_sparse
 from ..support.mechanisms import X, chain, errors, slider_crank
+
+DESIGNS = "kincheck.core.extensions.designs.design_batch"
 
 RADIUS = 0.1
 TIMES = np.linspace(-0.75, 0.75, 13)
@@ -163,6 +160,7 @@ def test_pinion_rolls_from_any_angle(solved, angles):
         assert "notes" not in found.details
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("solved", WAYS)
 @pytest.mark.parametrize("kind", ["sine", "typed table"])
 def test_typed_digits_start_at_design(solved, kind):
@@ -272,6 +270,7 @@ FAR = 1.0
 """By what the arm at time zero is ahead of its design [rad]."""
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("solved", WAYS)
 def test_ambiguous_start_is_noted(solved):
     mechanism = arm(60.0)
@@ -306,6 +305,7 @@ def test_equal_starts_are_not_ambiguous():
     assert "go straight from it to time zero (u = 1.68" in note
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("solved", WAYS)
 def test_start_with_one_reachable_way(solved):
     """Straight to time zero, the tip would go through the hinge, where links of different lengths
@@ -335,6 +335,7 @@ def test_components_start_at_typed_phase():
 
 
 def test_designs_start_at_typed_phase():
+    designs = pytest.importorskip(DESIGNS).solve_designs
     mechanism = turned_arm()
     values, tips = np.linspace(-1.0, 1.0, 5), np.array([(1.0, 0.1, 0.0), (0.9, 0.2, 0.0)])
     for phase in (math.pi, six(math.pi), 1.0):
@@ -347,6 +348,7 @@ def test_designs_start_at_typed_phase():
 
 
 def test_designs_note_assumed_start():
+    designs = pytest.importorskip(DESIGNS).solve_designs
     tips = {"points.tip.position": np.array([(1.0, 0.1, 0.0)])}
     near, far = (
         designs(turned_arm(), "u", TIMES, tips, motions={"v": Sine(0.5, 0.3, phase)}).notes
@@ -358,6 +360,10 @@ def test_designs_note_assumed_start():
 
 @pytest.mark.parametrize(("phase", "said"), [(six(math.pi), False), (1.0, True)])
 def test_study_notes_assumed_start(phase, said, tmp_path):
+    read_variation = pytest.importorskip(
+        "kincheck.core.extensions.sweep.variation_file"
+    ).read_variation
+    sweep_designs = pytest.importorskip("kincheck.core.extensions.sweep.sweep").sweep_designs
     mechanism = turned_arm()
     file = tmp_path / "vary.toml"
     what = '[units]\nlength = "m"\n[hardpoints.tip]\nat = "points.tip.position"\nsigma = 0.001\n'
@@ -389,6 +395,7 @@ def test_simulator_starts_at_typed_phase():
 
 def test_written_start_is_reached():
     """The way begins at the design, also where the motion does not, so that turns are counted."""
+    way_to = pytest.importorskip("kincheck.core.extensions.exports.model_writer").way_to
     mechanism = turned_arm(60.0)
     case = case_of(mechanism, {"u": Sine(9.0, 0.1, 1.5), "v": Ramp(0.1)})
     way = way_to(case, 0.5)
@@ -400,6 +407,9 @@ def test_written_start_is_reached():
 
 
 def test_typed_digits_are_proved():
+    prove_case = pytest.importorskip(
+        "kincheck.core.extensions.proofs.verified_reference"
+    ).prove_case
     mechanism = arm(60.0)
     case = case_of(mechanism, circling(mechanism, map(six, phases_of(60.0))))
     made, _ = prove_case(case, digits=20, numbers="double", tol=1e-12)

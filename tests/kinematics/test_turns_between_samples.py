@@ -4,26 +4,18 @@ style, as one program, a sparse system, and in every engine.
 Where it stands says nothing of the turns, but a wheel that is geared to it does.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from kincheck import adapters
 from kincheck.core import (
-    JointAngle,
-    JointDisplacement,
-    Point,
-    Screw,
     Table,
-    Translational,
 )
 from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
-from kincheck.core.extensions.laboratory.bench.size import ring
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.kinematics.formulation.styles import styles
 
-from ..support.mechanisms import ORIGIN, X, Y, Z, indexing, solve_all
+from ..support.mechanisms import X, Y, indexing, solve_all
 
 
 def indexed(turns):
@@ -62,30 +54,3 @@ def test_styles_count_turns_between_samples(turns, style):
     angle = 0.5 * np.pi * turns * np.array([0.0, 1.0])
     expected = np.stack([1.0 + 0.2 * np.cos(angle), 0.2 * np.sin(angle), 0.0 * angle], axis=1)
     assert np.abs(found.points["rim"].position - expected).max() < 1e-12
-
-
-@pytest.mark.parametrize(
-    ("cranks", "turns", "count"), [(9, 1, 2), (9, -4, 11), (22, -2, 2), (22, 1, 11)]
-)
-def test_ring_counts_turns_between_samples(cranks, turns, count):
-    """A nut beside a ring, whose lead tells the turns: as one program, and as a sparse system."""
-    whole, lead, last = ring(cranks), 0.01, 0.01
-    joints = [
-        Screw("thread", "ground", "driven", ORIGIN, Z, lead=lead),
-        Translational("guide", "ground", "slide", Z, X),
-    ]
-    mechanism = replace(
-        whole,
-        bodies=[*whole.bodies, *indexing().bodies[1:]],
-        joints=[*whole.joints, *joints],
-        points=[Point("mark", "driven", (0.2, 0.0, 0.0))],
-        drivers=[
-            *whole.drivers,
-            JointDisplacement("clock", "guide"),
-            JointAngle("index", "thread"),
-        ],
-    )
-    values = np.linspace(0.0, last, count)
-    found = solve_all(mechanism, "clock", values, rate=last, motions={"index": indexed(turns)})
-    assert ("factor_entries" in found.details) == (cranks == 22)
-    assert found.points["mark"].position[-1] == pytest.approx([0.2, 0.0, lead * turns], abs=1e-14)

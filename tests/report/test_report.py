@@ -10,37 +10,16 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from kincheck.core import solve
-from kincheck.core.extensions.laboratory.bench.size import ring
 from kincheck.core.harness.record import Results
 from kincheck.core.report import sections
 from kincheck.core.report.report import headline
 from kincheck.core.report.sections import split_message
 from msgspec.structs import replace
 
-from ..support.mechanisms import chain
 from ..support.strut_results import GRID, record, results, series
 from .page import report
 
 HOSTILE = "<script>alert('x')</script><a href='https://example.org'>&amp;</a>"
-
-
-@pytest.mark.parametrize("mechanism", [chain(21), ring(24)], ids=["components", "sparse"])
-def test_page_of_large_mechanism_has_programs(mechanism, tmp_path):
-    """What the native engine really tells of them."""
-    details = solve(mechanism, "turn", [0.0], points=()).details
-    assert ("components" in details) != ("factor_entries" in details)
-    page = report(
-        Results(
-            run={},
-            records=[record("large", "consensus_only", "native", 0.0, [0.0], details=details)],
-        ),
-        tmp_path,
-    )
-    for name, size in details["program"].items():
-        assert name in page.text
-        assert str(size["flops"]) in page.text
-    assert details["dof_account"]["paper"].replace("-", "−") in page.text
 
 
 def test_page_starts_with_outcomes(tmp_path):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-from kincheck import Supplied, cases, load
-from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+from kincheck import cases
 from kincheck.core.harness.scene import FRAMES, scene
 from msgspec.structs import replace
 
@@ -55,16 +53,3 @@ def test_scene_without_poses_in_browser(visit):
     )
     assert (told["said"], told["controls"], told["drawn"]) == ("design position", 0, True)
     assert "no answer in this run: this is the design position" in told["note"]
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(("axle", "named"), [(None, True), ("heave", False)])
-def test_crowded_names_begin_hidden(visit, tmp_path, axle, named):
-    """Those of a strut's few points have room, those of an axle have not."""
-    (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["double_wishbone"]), "utf-8")
-    case = load(tmp_path / "car.csv", Supplied(axle=axle)) if axle else cases.load("four_bar")
-    told = visit(
-        replace(results(), scenes={"strut": scene(case, poses=False)}),
-        "return one('[data-layer=names]').checked;",
-    )
-    assert told == named

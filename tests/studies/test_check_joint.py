@@ -28,7 +28,6 @@ from kincheck.core.harness.results_file import read_results
 from kincheck.core.joints import AxialJoint
 from kincheck.core.studies.checks.findings import Verdict
 
-from ..support.by_night import sparse_by_day
 from ..support.fakes import Fake, native_but
 from ..support.joint_mutants import mutants
 from .test_check_joint_mistakes import mistaken
@@ -51,14 +50,16 @@ WITHOUT_EQUIVALENT = ("bowl", "point_on_parabola", "line_no_twist", "torus")
 pytestmark = pytest.mark.usefixtures("own_joint_types")
 
 
-@pytest.mark.parametrize("name", sparse_by_day(BUILT_IN, 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("name", BUILT_IN)
 def test_check_joint_passes_builtin_joints(few, name):
     report = check_joint(Joint.registry[name], samples=8)
     assert report.passed, report
     assert len({each.check for each in report.findings}) == len(report.findings)
 
 
-@pytest.mark.parametrize("module", sparse_by_day(USERS, 2))
+@pytest.mark.by_day(2)
+@pytest.mark.parametrize("module", USERS)
 def test_check_joint_passes_user_joints(few, in_folder, module):
     engines = [adapters.engine(name) for name in adapters.ENGINES]
     report = check_joint(load_joint(f"{module}:{USERS[module]}"), samples=8, engines=engines)
@@ -498,9 +499,8 @@ HARMLESS = tuple(
 HARMFUL = sorted(name for name in EVERY if not name.startswith(HARMLESS))
 
 
-@pytest.mark.parametrize(
-    "mutant", sparse_by_day(random.Random(SEED).sample(HARMFUL, CHOSEN), 4, first=1)
-)
+@pytest.mark.by_day(4)
+@pytest.mark.parametrize("mutant", random.Random(SEED).sample(HARMFUL, CHOSEN))
 def test_check_joint_finds_one_term_mutant(mutant, own_joint_types, monkeypatch):
     module = types.ModuleType("mutant")
     monkeypatch.setitem(sys.modules, "mutant", module)
@@ -511,6 +511,7 @@ def test_check_joint_finds_one_term_mutant(mutant, own_joint_types, monkeypatch)
         assert any(not report.passed for report in reports)
 
 
+@pytest.mark.nightly
 def test_check_joint_passes_telescope_joints(own_joint_types, in_folder):
     from telescope import Telescope, Threaded
 

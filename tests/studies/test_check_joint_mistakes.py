@@ -32,7 +32,6 @@ from kincheck.core.studies.checks.joint_loops import (
     with_own_drivers,
 )
 
-from ..support.by_night import sparse_by_day
 from ..support.engine_faults import changed
 from ..support.fakes import native_but
 
@@ -291,7 +290,8 @@ MISTAKES_OF_DRIVERS = {
 MISTAKES |= {name: ("driver", make) for name, make in MISTAKES_OF_DRIVERS.items()}
 
 
-@pytest.mark.parametrize("mistake", sparse_by_day(MISTAKES, 2))
+@pytest.mark.by_day(2)
+@pytest.mark.parametrize("mistake", MISTAKES)
 def test_check_joint_finds_joint_mistakes(mistake, few, monkeypatch):
     """Few poses find them; the two dear checks run where they must find one."""
     check, make = MISTAKES[mistake]

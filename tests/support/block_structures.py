@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
+import pytest
 from kincheck.core import Body, Inline, JointAngle, Mechanism, Point, Revolute, Spherical
-from kincheck.core.extensions.laboratory.bench.size import LEAN, pivot
 from kincheck.core.kinematics import Method, NativeSolver
 
 
@@ -52,6 +52,7 @@ def assert_alike(found, expected):
 
 def chain_of_hinges(loops):
     """Return a chain of four-bars whose joints are all hinges: three redundant rows a loop."""
+    LEAN = pytest.importorskip("kincheck.core.extensions.laboratory.bench.size").LEAN
     n, s, c, up = range(loops), math.sin(LEAN), math.cos(LEAN), (0.0, 0.0, 1.0)
     pivots = [
         Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), up)
@@ -75,9 +76,10 @@ def torus(rows, columns):
     several singular values vanish together, so the determinant keeps its sign.
     """
 
+    size = pytest.importorskip("kincheck.core.extensions.laboratory.bench.size")
     cranks = [(i, j) for i in range(rows) for j in range(columns)]
-    at = {(i, j): (pivot(i, rows), 1.37 * pivot(j, columns)) for i, j in cranks}
-    tip = {k: (x + math.sin(LEAN), y + math.cos(LEAN), 0.0) for k, (x, y) in at.items()}
+    at = {(i, j): (size.pivot(i, rows), 1.37 * size.pivot(j, columns)) for i, j in cranks}
+    tip = {k: (x + math.sin(size.LEAN), y + math.cos(size.LEAN), 0.0) for k, (x, y) in at.items()}
     up = (0.0, 0.0, 1.0)
     joints = [Revolute(f"pivot{k}", "ground", f"crank{k}", (*at[k], 0.0), up) for k in cranks]
     for i, j in cranks[1:]:

@@ -94,6 +94,13 @@ def rows(text, named=True):
     return table
 
 
+def at_hand(table, names):
+    """The rows of a table whose first word is one of some names, such as of commands: extensions
+    bring them.
+    """
+    return [row for row in table if re.match(r"\w+", row.values[0])[0] in names]
+
+
 def supplied(text):
     """Options of a reader from words NAME=VALUE, of which the last counts; without a value none."""
     pairs = (word.split("=", 1) for word in text.split())

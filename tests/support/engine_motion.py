@@ -50,8 +50,9 @@ def way_by_day(engine, kind):
 
 
 def installed(name, mode="projection"):
-    engine = adapters.engine(name, mode)
-    if engine.version() is None:
+    known = adapters.ENGINES if mode == "projection" else adapters.SIMULATIONS
+    engine = adapters.engine(name, mode) if name in known else None
+    if engine is None or engine.version() is None:
         pytest.skip(f"{name} is not installed")
     return engine
 

@@ -9,9 +9,8 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pytest
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.extensions.laboratory.truth.forces import known_forces
-from kincheck.core.extensions.laboratory.truth.motion import follow_motion
 from kincheck.core.kinematics import solve
 
 HINGES = {"a": (0.0, 0.0, 0.0), "b": (0.0, 0.0, 0.3), "c": (0.5, 0.0, 0.5), "d": (0.6, 0.0, 0.0)}
@@ -135,6 +134,12 @@ def truth(cross=None):
     """Reactions and efforts of exact axes, as `components`: not a number where rigid bodies do not
     determine them.
     """
+    follow_motion = pytest.importorskip(
+        "kincheck.core.extensions.laboratory.truth.motion"
+    ).follow_motion
+    known_forces = pytest.importorskip(
+        "kincheck.core.extensions.laboratory.truth.forces"
+    ).known_forces
     with tempfile.TemporaryDirectory() as folder:
         case = load_case(written(Path(folder), cross=cross))
     known = known_forces(case, follow_motion(case))

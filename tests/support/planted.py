@@ -11,6 +11,7 @@ import copy
 import dataclasses
 import enum
 import html
+import io
 import math
 import re
 import zlib
@@ -21,6 +22,7 @@ from typing import Any
 import msgspec
 import numpy as np
 from jinja2 import UndefinedError
+from kincheck.core.harness.record import to_json
 
 MARK = "qvx7"
 """A word that stands nowhere."""
@@ -156,3 +158,30 @@ def _rounds(value: float, text: str) -> bool:
     digits, _, exponent = text.lower().partition("e")
     last = 10.0 ** (int(exponent or 0) - len(digits.partition(".")[2]))
     return float(text) != 0.0 and abs(abs(float(text)) - abs(value)) <= 0.51 * last
+
+
+def on_terminal(write):
+    def form(result):
+        write(result, text := io.StringIO())
+        return text.getvalue()
+
+    return form
+
+
+def as_json(result):
+    return to_json(result).decode()
+
+
+def unexplained(found, exempt):
+    """Places that a form lacks without a reason, and reasons that no form needs any more."""
+    lacking = {(place, form) for place, forms in found.items() for form in forms}
+    excused = {
+        each: {
+            (place, form)
+            for place, form in lacking
+            if re.fullmatch(each[0], place) and form in each[1].split()
+        }
+        for each in exempt
+    }
+    needless = [each for each, pairs in excused.items() if not pairs]
+    return sorted(lacking.difference(*excused.values())), needless

@@ -13,12 +13,12 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 
-STRUT = tomllib.loads((cases.FOLDER / "mcpherson_suspension.toml").read_text())
+STRUT = tomllib.loads(cases.file("mcpherson_suspension").read_text())
 AXES = {"convention": "iso8855", "forward": [1, 0, 0], "up": [0, 0, 1]}
 MIRROR = np.diag([1, -1, 1])
 
 
-TABLE = (cases.FOLDER / "mcpherson_suspension.csv").read_text()
+TABLE = cases.file("mcpherson_suspension").with_suffix(".csv").read_text()
 
 
 TOE = {"outputs": {"toe": {"type": "toe"}}}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from kincheck.core.case.io.reader_options import Supplied
 
-from ..fuzz import urdf as seeds
+from ..extensions.trees.fuzz import urdf as seeds
 
 DRIVE = Supplied(drive=("A:0:0.5:5",))
 FOUR_BAR = seeds.FOUR_BAR.decode()

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...forces import Forces
 from ...kinematics.compiled.compiled_model import Model, compile_model
-from ...kinematics.compiled.request import FORCE_SIGMA, REDUNDANT, SIGMA
+from ...kinematics.compiled.request import FORCE_SIGMA, SIGMA
 from ...kinematics.compiled.routes import Route
 from ...kinematics.followed import follower
 from ...kinematics.forces.reactions import forces_of
@@ -93,8 +93,6 @@ def moved_forces(route: Route, found: Variants, moved: Mapping[str, Array]) -> F
     for name, values in moved.items():
         first = model.rows[name].start
         kept[first : first + len(values)] = values
-    if traced.redundant:  # what is determined has no part in what is not
-        kept[model.rows[REDUNDANT].start :][: traced.redundant] = 0.0
     table = kept.reshape(len(kept), -1).T
     return ForcesOfDesigns(_regular(model, found), traced.of(table), every, {})
 
@@ -136,7 +134,7 @@ def _alone(route: Route, wanted: WantedForces, geometry: Array, tol: float) -> S
 def _motion(model: Model, found: Variants, k: int) -> Trajectory:
     solved = found.solved[:, k]
     none: Mapping[str, Any] = {}
-    bodies = Motions(BodyMotion, found.kept[:, :, k].T, model.of_bodies)
+    bodies = Motions(BodyMotion, found.kept[:, :, k].T, model.motions[1])
     return Trajectory(none, solved, np.zeros(len(solved), np.int64), 0.0, bodies=bodies)
 
 

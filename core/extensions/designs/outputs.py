@@ -7,25 +7,27 @@ added here: turns of angles, signs of Euler parameters, and samples at rest.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...case.case import HELD_BUT, Case, Quantity
 from ...case.measures import ForceMeasure, JointAngle, Orientation
-from ...case.quantity import ORDERS
+from ...case.quantity import ORDERS, where_moving
 from ...case.turns import Completion, over_sweep
 from ...jet import Jet
 from ...kinematics import NativeSolver, WantedOutput
-from ...kinematics.compiled.request import OUTPUT
+from ...kinematics.compiled.request import OUTPUT, RESTING
+from ...kinematics.compiled.routes import Route
 from ...mechanism.motions import Path
 from ...trajectory import QUANTITIES, Array
 from ..slopes.slopes import Slope, derivatives
-from .design_batch import Variants
-from .design_forces import ForcesOfDesigns
+from .design_batch import RECYCLED, Variants, slopes_of
+from .design_forces import ForcesOfDesigns, moved_forces
 from .prepared import PreparedDesigns, prepare_designs
 
 TOL = 1e-12
@@ -33,6 +35,9 @@ TOL = 1e-12
 # Designs solved at once: enough to make the cost of the calls for their outputs negligible.
 # `solve_designs` has no outputs, and is as fast with a quarter of them.
 TOGETHER = 1024
+# With fewer at once, the calls around them would be felt.
+FEWEST = 8
+NO_GAPS = Jet(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +90,10 @@ class DesignOutputs:
         }
         wanted = [
             WantedOutput(
-                each, derivatives[name], tuple(each.facts.get(HELD_BUT, ())), slopes.get(name, 0)
+                equation_of(each),
+                derivatives[name],
+                tuple(each.facts.get(HELD_BUT, ())),
+                slopes.get(name, 0),
             )
             for name, each in outputs.items()
             if not each.forces
@@ -111,12 +119,16 @@ class DesignOutputs:
 
     def on_path(self, path: Path) -> DesignOutputs:
         """Return the same program on another path of the same drivers."""
-        return replace(self, designs=self.designs.on_path(path), path=path)
+        route = Route(self.designs.route.model, path)
+        return replace(self, designs=replace(self.designs, route=route), path=path)
 
     @property
     def at_once(self) -> int:
-        """The number of designs to solve together."""
-        return self.designs.at_once(TOGETHER)
+        """The number of designs to solve together: the table of their motions fits in recycled
+        memory.
+        """
+        of_a_design = 8 * self.designs.route.model.kept * len(self.path.times)
+        return max(FEWEST, min(TOGETHER, RECYCLED // of_a_design))
 
     def solve(self, geometry: Array, tol: float = TOL, *, alone: bool = True) -> SolvedDesigns:
         """Solve designs at all samples.
@@ -126,6 +138,22 @@ class DesignOutputs:
             tol, alone: see `PreparedDesigns.solve`.
         """
         return SolvedDesigns(self, geometry, tol, self.designs.solve(geometry, tol, alone=alone))
+
+
+def equation_of(output: Any) -> Any:
+    """Return an output without numbers on which its equation does not depend, so that designs share
+    programs: tolerances, and a radius beside the point that it leads to.
+    """
+    kept = dict[str, Any]()
+    for each in fields(output):
+        value = getattr(output, each.name)
+        if each.name in ("atol", "rtol", "why"):
+            kept[each.name] = type(value)()
+        elif each.name == "of_output":
+            kept[each.name] = equation_of(value)
+        elif getattr(value, "wheel_contact", None) is not None:
+            kept[each.name] = replace(value, wheel_radius=1.0)
+    return replace(output, **kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +170,7 @@ class SolvedDesigns:
     tol: float
     found: Variants
     _completions: dict[str, Completion] = field(default_factory=dict[str, Completion])
+    _still: dict[int, Array | None] = field(default_factory=dict[int, Array | None])
 
     @property
     def solved(self) -> NDArray[np.bool_]:
@@ -154,7 +183,7 @@ class SolvedDesigns:
 
     def pose(self, body: str) -> Array:
         """Return origin [m] and Euler parameters of a body that was asked for, shape (7, n, V)."""
-        return self.ready.designs.pose(self.found, body)
+        return np.concatenate([self._kept(f"{each} {body}") for each in "rp"])
 
     def values(self, name: str, derivative: int = 0) -> Array:
         """Return an output, or a kept time derivative of it, shape (n, V); NaN where it has no
@@ -164,9 +193,14 @@ class SolvedDesigns:
         if isinstance(output, ForceMeasure):
             assert self._forces is not None  # the case asks for them
             return self._forces.read(output.values)
-        with np.errstate(all="ignore"):  # unknown numbers are NaN, and so is all they give
-            jet = self._completed(name)(self._terms(name))
-        values = np.asarray((jet.x, jet.v, jet.a)[derivative])
+        if isinstance(output, Orientation) or output.period:
+            with np.errstate(all="ignore"):  # unknown numbers are NaN, and so is all they give
+                jet = self._completed(name)(self._terms(name))
+            values = np.asarray((jet.x, jet.v, jet.a)[derivative])
+        else:
+            (values,) = self._kept(f"{OUTPUT}{QUANTITIES[derivative]} {name}")
+            if (gaps := self._gaps(name)) is not None:
+                values = values + gaps
         known = np.isfinite(values)
         return values if known.all() else np.where(known, values, np.nan)
 
@@ -178,16 +212,18 @@ class SolvedDesigns:
         Args:
             towards: motions of the varied numbers, shape (numbers, motions).
         """
-        sloped, designs, outputs = self.ready.sloped, self.ready.designs, self.ready.outputs
+        sloped, route, outputs = self.ready.sloped, self.ready.designs.route, self.ready.outputs
         if not sloped:
             return
-        moved = designs.slopes(self.found, self.geometry, towards)
+        moved = dict[str, Array]()
+        if route.model.request.slopes:  # of forces that cannot be traced there are none
+            moved = slopes_of(route, self.found, self.geometry, towards)
         measures = {
             name: each for name in sloped if isinstance(each := outputs[name], ForceMeasure)
         }
         carried = {name: np.empty((towards.shape[1], *self.solved.shape)) for name in measures}
         for k in range(towards.shape[1]) if measures else ():
-            forces = designs.moved_forces(self.found, {name: x[k] for name, x in moved.items()})
+            forces = moved_forces(route, self.found, {name: x[k] for name, x in moved.items()})
             for name, measure in measures.items():
                 carried[name][k] = forces.read(measure.values)
         for name, count in sloped.items():
@@ -209,17 +245,32 @@ class SolvedDesigns:
             jet = self._completed(name)(e)
         return np.asarray(derivatives((jet.x, jet.v, jet.a)[order]))
 
+    def _kept(self, name: str) -> Array:
+        """Return the numbers of a vector, shape (numbers, n, V)."""
+        return self.found.kept[self.ready.designs.route.model.rows[name]]
+
     def _terms(self, name: str) -> list[Jet]:
-        designs, orders = self.ready.designs, range(self.ready.derivatives[name] + 1)
-        known = [designs.output(self.found, name, order) for order in orders]
+        labels = QUANTITIES[: self.ready.derivatives[name] + 1]
+        known = [self._kept(f"{OUTPUT}{label} {name}") for label in labels]
         unknown = [np.broadcast_to(np.nan, known[0].shape)] * (ORDERS - len(known))
         return [Jet(*each) for each in zip(*known, *unknown, strict=True)]
 
     def _completed(self, name: str) -> Completion:
         if name not in self._completions:
-            ready, resting = self.ready, self.ready.designs.resting(self.found, name)
+            ready, terms = self.ready, self._terms(name)
             mechanism, output = ready.case.mechanism, ready.outputs[name]
-            self._completions[name] = over_sweep(
-                mechanism, ready.path, output, self._terms(name), resting
-            )
+            self._completions[name] = over_sweep(mechanism, ready.path, output, terms, None)
         return self._completions[name]
+
+    def _gaps(self, name: str) -> Array | None:
+        """Return NaN at samples where an output has no value at rest, zero at others; None if there
+        are none. Many outputs have the same speeds.
+        """
+        rows = self.ready.designs.route.model.rows.get(f"{RESTING}{name}")
+        if rows is None:
+            return None
+        if rows.start not in self._still:
+            own, fastest = self.found.kept[rows]
+            gaps = where_moving(NO_GAPS, (own, fastest))
+            self._still[rows.start] = None if gaps is NO_GAPS else np.asarray(gaps.x)
+        return self._still[rows.start]

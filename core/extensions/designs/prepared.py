@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from ...kinematics.compiled.compiled_model import compile_model
-from ...kinematics.compiled.request import OUTPUT, RESTING, WantedOutput
-from ...kinematics.compiled.routes import Route, Start
+from ...kinematics.compiled.request import WantedOutput
+from ...kinematics.compiled.routes import Route
 from ...kinematics.forces.wanted import WantedForces
-from ...kinematics.native_solver import NativeSolver, ProgramSize
+from ...kinematics.native_solver import NativeSolver
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
-from ...program import ITERATIONS
 from ...trajectory import QUANTITIES, Array
-from .design_batch import RECYCLED, Variants, slopes_of, solve_variants, start_notes
-
-if TYPE_CHECKING:
-    from .design_forces import ForcesOfDesigns
+from .design_batch import Variants, solve_variants
+from .design_forces import ForcesOfDesigns, forces_of_designs
 
 
 def prepare_designs(
@@ -64,10 +58,6 @@ def prepare_designs(
     return PreparedDesigns(Route(compile_model(mechanism, request), path), wanted)
 
 
-# Designs solved at once at least: with fewer, the calls around them would be felt.
-FEWEST = 8
-
-
 @dataclass(frozen=True, eq=False)
 class PreparedDesigns:
     """A mechanism of varied geometry, made ready for a path.
@@ -79,27 +69,6 @@ class PreparedDesigns:
 
     route: Route
     wanted: WantedForces | None = None
-
-    def on_path(self, path: Path) -> PreparedDesigns:
-        """Return the same programs on another path of the same drivers."""
-        return replace(self, route=Route(self.route.model, path))
-
-    @property
-    def start(self) -> Start:
-        """The start of the nominal design."""
-        return self.route.begin
-
-    @property
-    def size(self) -> ProgramSize:
-        """The size of the programs."""
-        return ProgramSize.of(self.route.model)
-
-    def at_once(self, most: int) -> int:
-        """Return the number of designs to solve together, at most the given one: the table of their
-        motions fits in recycled memory.
-        """
-        of_a_design = 8 * self.route.model.kept * len(self.route.path.times)
-        return max(FEWEST, min(most, RECYCLED // of_a_design))
 
     def solve(self, geometry: Array, tol: float, *, alone: bool = True) -> Variants:
         """Solve designs at all samples.
@@ -117,34 +86,6 @@ class PreparedDesigns:
         rows, orders = self.route.model.rows, self.route.model.orders
         return [found.kept[rows[f"{label} {point}"]] for label in QUANTITIES[:orders]]
 
-    def pose(self, found: Variants, body: str) -> Array:
-        """Return origin [m] and Euler parameters of a requested body, shape (7, n, V)."""
-        rows = self.route.model.rows
-        return np.concatenate([found.kept[rows[f"{each} {body}"]] for each in "rp"])
-
-    def output(self, found: Variants, name: str, derivative: int = 0) -> Array:
-        """Return the terms of an output, or a time derivative of theirs, shape (terms, n, V)."""
-        return found.kept[self.route.model.rows[f"{OUTPUT}{QUANTITIES[derivative]} {name}"]]
-
-    def resting(self, found: Variants, name: str) -> tuple[Array, Array] | None:
-        """Return squares of the speeds of an output without a value at rest, shape (n, V); None for
-        any other output.
-        """
-        rows = self.route.model.rows.get(f"{RESTING}{name}")
-        return None if rows is None else (found.kept[rows][0], found.kept[rows][1])
-
-    def slopes(self, found: Variants, geometry: Array, towards: Array) -> Mapping[str, Array]:
-        """Return the derivatives of the vectors of outputs and forces whose slopes are wanted, by
-        motions of the geometry, drivers held, shape (motions, numbers, n, V); NaN at samples not
-        reached.
-
-        Args:
-            found: result of `solve` for the geometry.
-            towards: motions of the varied numbers, shape (numbers, motions).
-        """
-        wanted = self.route.model.request.slopes  # of forces that cannot be traced there are none
-        return slopes_of(self.route, found, geometry, towards) if wanted else {}
-
     def forces(self, found: Variants, geometry: Array, tol: float) -> ForcesOfDesigns | None:
         """Return the forces of solved designs; None where none are wanted.
 
@@ -153,25 +94,4 @@ class PreparedDesigns:
         """
         if self.wanted is None:
             return None
-        from .design_forces import forces_of_designs  # most studies are without
-
         return forces_of_designs(self.route, self.wanted, found, geometry, tol)
-
-    def moved_forces(self, found: Variants, moved: Mapping[str, Array]) -> ForcesOfDesigns:
-        """Return the derivatives of forces in the place of forces; see `design_forces`.
-
-        Args:
-            moved: vectors of `slopes` by one of its motions.
-        """
-        from .design_forces import moved_forces
-
-        return moved_forces(self.route, found, moved)
-
-    def iterations(self, found: Variants) -> Array:
-        """Return Newton's iterations of each sample, shape (n, V)."""
-        return found.kept[self.route.model.rows[ITERATIONS].start]
-
-    def start_notes(self, tol: float) -> list[str]:
-        """Return notes on the assumed start of the nominal design; none if it is certain."""
-        model = self.route.model
-        return start_notes(model.mechanism, model.request, self.route.path, tol)

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,26 +36,6 @@ from ...primitives.base import GROUND_POSE, Drive
 from ...trajectory import Array, Trajectory
 from ..slopes.slopes import Slope, derivatives
 from .rank import Screw, screws
-
-
-class Geometry:
-    """A geometry that depends on parameters.
-
-    Attributes:
-        slopes: values of the places that move, each number with its derivatives by all parameters.
-        parameters: number of parameters.
-    """
-
-    def __init__(self, mechanism: Mechanism, moves: Mapping[str, Array]) -> None:
-        values = places(mechanism)
-        self.slopes = {place: tuple(map(Slope, values[place], moves[place])) for place in moves}
-        self.parameters = next((moves[place].shape[1] for place in moves), 0)
-
-    def derivatives_of(self, x: Any) -> Array:
-        """Return the derivatives of a number by all parameters, shape (parameters,); zero for an
-        independent number.
-        """
-        return np.broadcast_to(derivatives(x), (self.parameters,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,8 +116,10 @@ def conditioning(
         int(k) for k in np.linspace(0, len(path.times) - 1, min(samples, len(path.times))).round()
     }
     at |= {int(np.abs(path.times).argmin()), *(reached[[0, -1]].tolist() if len(reached) else [])}
-    geometry = Geometry(mechanism, moves)
-    elsewhere = placed(mechanism, geometry.slopes)
+    known, parameters = places(mechanism), sum(each.shape[1] for each in [*moves.values()][:1])
+    elsewhere = placed(
+        mechanism, {place: tuple(map(Slope, known[place], each)) for place, each in moves.items()}
+    )
     looked, matrices = list[PoseConditioning](), list[Array]()
     seen = sorted(at & set(reached.tolist()))
     for k in seen:
@@ -169,7 +150,7 @@ def conditioning(
         phi = Cartesian.of(elsewhere, frame, _held(mechanism, elsewhere, drives, frame)).phi(
             configuration
         )
-        by_geometry = np.array([geometry.derivatives_of(x) for x in phi])
+        by_geometry = np.array([np.broadcast_to(derivatives(x), parameters) for x in phi])
         shift = -inverse @ by_geometry[kept]
         steps = [Slope(0.0, row) for row in metres]
         poses = formulation.configuration(formulation.retract(configuration, steps)).poses

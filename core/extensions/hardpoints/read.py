@@ -143,7 +143,7 @@ def case_of_hardpoints(
         swing_arms=supplied.swing_arms,
     )
     if followed:
-        turned, unsteered = shims(template, at, vehicle.static_toe, vehicle.static_camber)
+        turned, unsteered = shims(template, at, vehicle)
         hardpoints = hardpoints_of(
             named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned, unsteered
         )

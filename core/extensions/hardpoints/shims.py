@@ -15,13 +15,19 @@ w*),  exactly.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from ...algebra import Vec3
+from ...jet import Jet
 from ...mechanism.mechanism import GROUND, Vector
 from ...trajectory import Array
-from .templates import KNUCKLE, TIEROD_INNER, WHEEL_AXIS, WHEEL_CENTER, Template
+from .suspension import Side, Vehicle
+from .suspension.base import Attitude
+from .suspension.wheel import Camber, Caster, Toe
+from .templates import KNUCKLE, TIEROD_INNER, WHEEL_CENTER, Template
 
 Held = tuple[str, Array, Mapping[str, float]]
 """Role of a place of the carrier, the direction held there, and roles whose shims move it."""
@@ -29,7 +35,7 @@ _AXES = np.eye(3)
 
 
 def shims(
-    template: Template, at: Mapping[str, Vector], toe: float, camber: float
+    template: Template, at: Mapping[str, Vector], wheel: Vehicle
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return by role what the position of a joint does; nothing for a carrier that is held
     otherwise.
@@ -41,65 +47,61 @@ def shims(
 
     Args:
         at: positions by role of a left wheel [m].
-        toe, camber: at design, if no point states the wheel's axis [rad].
+        wheel: of the roles, with its angles at design if no point states its axis.
     """
     places = {role: np.array(place) for role, place in at.items()}
+    center = places[WHEEL_CENTER]
     # the height of the wheel's centre is held too
     held: list[Held] = [*_joints(template, places), (WHEEL_CENTER, _AXES[2], {})]
     if len(held) != 6:
         return {}, {}
-    spin = np.array([np.sin(toe), np.cos(toe), -np.tan(camber)])
-    if WHEEL_AXIS in places:
-        spin = places[WHEEL_AXIS] - places[WHEEL_CENTER]
-    spin = spin / np.linalg.norm(spin)
-    x, y, _ = spin
-    arms = [places[role] - places[WHEEL_CENTER] for role, _, _ in held]
+    angles = np.sin(wheel.static_toe), np.cos(wheel.static_toe), -np.tan(wheel.static_camber)
+    places.setdefault(wheel.spin_marker, center + angles)
+    arms = [places[role] - center for role, _, _ in held]
     rows = np.array([np.r_[n, np.cross(r, n)] for (_, n, _), r in zip(held, arms, strict=True)])
+    of_points = [end for end in template.kingpin or () if isinstance(end, str)]
+    toe, *others = (
+        each("", replace(wheel, side=Side.LEFT), 0.0, 0.0, "")
+        for each in (Toe, Camber, Caster)[: 3 if of_points else 2]
+    )
+
+    def rate(angle: Attitude, twist: Array, shimmed: str = "") -> Array:
+        """Return the rates of an angle by motions of the carrier, shape (6, motions), and of a
+        joint along each axis.
+        """
+        v, w = twist.reshape(2, 3, -1)
+
+        def moving(name: str) -> Vec3:
+            own = _AXES if name == shimmed else 0.0
+            on_body = any(role == name and movers.get(name, 0.0) > 0.0 for role, _, movers in held)
+            turned = v + np.cross(w.T, places[name] - center).T
+            found = np.zeros_like(v) + own + (0.0 if on_body else turned)
+            return Vec3(*map(Jet, places[name], found, 0.0 * found))
+
+        now = {name: moving(name) for name in angle.points}
+        return angle.of(now, now).v
+
     found = dict[str, Array]()
     for role in dict.fromkeys(role for *_, movers in held for role in movers):
         right = np.array([movers.get(role, 0.0) * n for _, n, movers in held])
-        solved = np.asarray(np.linalg.solve(rows, right), float)
-        v, turns = solved.reshape(2, 3, 3)  # by x, y and z of the joint
-        dx, dy, dz = np.cross(turns.T, spin).T
-        angles = [(y * dx - x * dy) / (x * x + y * y), -dz / np.hypot(x, y)]
-        if ends := [end for end in template.kingpin or () if isinstance(end, str)]:
-            low, high = (_end_velocity(end, role, held, places, v, turns) for end in ends)
-            x_of, _, z_of = places[ends[1]] - places[ends[0]]
-            turned = x_of * (high - low)[2] - z_of * (high - low)[0]
-            angles += [turned / (x_of * x_of + z_of * z_of)]
-        found[role] = np.array(angles)
+        twist = np.asarray(np.linalg.solve(rows, right), float)  # by x, y and z of the joint
+        found[role] = np.array([rate(each, twist, role) for each in (toe, *others)])
     rods = [k for k, (*_, movers) in enumerate(held) if TIEROD_INNER in movers]
     if not rods:
         return found, {}
     outer = held[rods[0]][0]
     along = places[outer] - places[TIEROD_INNER]
     # the wheel's rate of toe in place of the tie rod, and a rate of one of the height, the last row
-    rows[rods[0]] = np.r_[0.0, 0.0, 0.0, x * spin[2], y * spin[2], -x * x - y * y]
+    rows[rods[0]] = rate(toe, np.eye(6))
     with np.errstate(divide="ignore", invalid="ignore"):
         try:
             solved = np.asarray(np.linalg.solve(rows, np.eye(6)[5]), float)
         except np.linalg.LinAlgError:  # the tie rod does not steer
             return found, {}
         v, w = solved.reshape(2, 3)
-        end = v + np.cross(w, places[outer] - places[WHEEL_CENTER])
+        end = v + np.cross(w, places[outer] - center)
         off = float(along @ end)
         return found, {TIEROD_INNER: off / end, outer: -off / (end + np.cross(along, w))}
-
-
-def _end_velocity(
-    end: str,
-    shimmed: str,
-    held: Sequence[Held],
-    places: Mapping[str, Array],
-    v: Array,
-    turns: Array,
-) -> Array:
-    """Return the velocity of an end of the steering axis by x, y and z of the shimmed joint."""
-    sign = next(movers.get(end, 0.0) for role, _, movers in held if role == end)
-    own = _AXES * (end == shimmed)
-    if sign > 0.0:  # on the chassis
-        return own
-    return v + np.cross(turns.T, places[end] - places[WHEEL_CENTER]).T + own
 
 
 def _joints(template: Template, at: Mapping[str, Array]) -> Iterator[Held]:

@@ -4,7 +4,17 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["compliance", "designs", "llvm", "proofs", "reports", "statics", "sweep"],
+    needs=[
+        "compliance",
+        "designs",
+        "hardpoints",
+        "live",
+        "llvm",
+        "proofs",
+        "reports",
+        "statics",
+        "sweep",
+    ],
     commands={"bench": "command:BenchAll", "stress": "command:StressEngines"},
     sources={"bench": "source:BenchOfRun"},
     styles={

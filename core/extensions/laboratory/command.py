@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ...case.io.reader_options import Supplied
 from ...cli.parser import Command
@@ -43,6 +43,7 @@ CASES = (STRUT, "stewart_platform")
 """Cases of the full benchmark: a suspension, and a mechanism of thirteen bodies with
 six coupled loops.
 """
+LOADED = "mcpherson_strut_loaded"
 WITHOUT = ("four_bar", "planar_slider_crank", "rssr")
 """Cases for the time without machine code: whole turns."""
 PARTS = ("work", "loop", "batch", "study", "size", "processes")
@@ -210,8 +211,8 @@ class BenchCompliance(Command):
 
 @options
 class BenchCurves(Command):
-    """Measure the time of all outputs of many designs against their kinematics alone, and of exact
-    slopes by the geometry.
+    """Measure the time of all outputs of many designs against their kinematics alone, of exact
+    slopes by the geometry, of a sweep, of the live page's answer, and of the first use.
     """
 
     about = "outputs of many designs, and their slopes by the geometry"
@@ -225,8 +226,9 @@ class BenchCurves(Command):
         from ...report.terminal import with_json
         from .bench.curves import lines, measure
 
-        case = registry.find_case(self.case, Supplied(axle=self.axle), driven=False)
-        found = measure(case, self.rounds)
+        supplied = Supplied(axle=self.axle)
+        case = registry.find_case(self.case, supplied, driven=False)
+        found = measure(case, Path(self.case), supplied, self.rounds)
         with with_json(found, self.json) as console:
             print(*lines(found), sep="\n", file=console.file)
         return Status.WITHIN
@@ -250,16 +252,42 @@ class BenchNumpy(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...report.terminal import with_json
-        from .bench.without_machine_code import lines, measure
+        from .bench import without_machine_code
 
-        problems: dict[str, str] = {}
-        cases = {case.name: case for case in registry.find_cases(self.case, problems)}
-        refuse(problems.values())
-        found = measure(cases, self.rounds)
-        with with_json(found, self.json) as console:
-            print(*lines(found), sep="\n", file=console.file)
-        return Status.WITHIN
+        return _measure_cases(self, registry, without_machine_code)
+
+
+@options
+class BenchForces(Command):
+    """Measure the forces of cases beside their motion, by processor time: solved, and read."""
+
+    about = "forces beside the motion"
+    case: tuple[str, ...] = option(
+        f"built-in names, patterns, or case files; default: {LOADED}",
+        metavar="CASE",
+        several="once",
+        default=(LOADED,),
+    )
+    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    json: str | None = json_file()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from .bench import forces
+
+        return _measure_cases(self, registry, forces)
+
+
+def _measure_cases(options: BenchNumpy | BenchForces, registry: Registry, bench: Any) -> int:
+    from ...report.terminal import with_json
+
+    problems: dict[str, str] = {}
+    cases = {case.name: case for case in registry.find_cases(options.case, problems)}
+    refuse(problems.values())
+    found = bench.measure(cases, options.rounds)
+    with with_json(found, options.json) as console:
+        print(*bench.lines(found), sep="\n", file=console.file)
+    return Status.WITHIN
 
 
 @options
@@ -298,6 +326,7 @@ class BenchAll(Command):
         "compliance": BenchCompliance,
         "curves": BenchCurves,
         "numpy": BenchNumpy,
+        "forces": BenchForces,
         "size": BenchSize,
     }
     out: Path | None = destination("write bench.json and bench.html there", Path, "DIR")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from types import MappingProxyType
@@ -26,7 +26,7 @@ from ...report.axis import DISPLAY, Axis, driver_axis
 from ...report.drawing import drawing
 from ...trajectory import Array
 from ...unit_text import unit_text
-from ..designs.outputs import DesignOutputs
+from ..designs.outputs import DesignOutputs, equation_of
 from ..hardpoints.options import WheelOptions
 from ..hardpoints.read import case_of_hardpoints
 from ..hardpoints.reader import read_hardpoints
@@ -441,20 +441,4 @@ def structure_of(case: Case) -> list[Any]:
     """Return the key of a program: all but the numbers of places, and tolerances."""
     joints = [f"{each.name} {each.type} {each.bodies}" for each in case.mechanism.joints]
     points = [f"{each.name} {each.body}" for each in case.mechanism.points]
-    return [*joints, *points, *places(case.mechanism), *map(_equation, case.outputs)]
-
-
-def _equation(output: Any) -> Any:
-    """Return an output without the numbers an edit changes beside places: its tolerance, and the
-    radius of a point.
-    """
-    kept = dict[str, Any]()
-    for each in fields(output):
-        value = getattr(output, each.name)
-        if each.name in ("atol", "rtol", "why"):
-            kept[each.name] = type(value)()
-        elif each.name == "of_output":
-            kept[each.name] = _equation(value)
-        elif getattr(value, "wheel_contact", None) is not None:
-            kept[each.name] = replace(value, wheel_radius=None)
-    return replace(output, **kept)
+    return [*joints, *points, *places(case.mechanism), *map(equation_of, case.outputs)]

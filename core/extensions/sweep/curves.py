@@ -219,13 +219,19 @@ def _ready(
             raise CaseError(f"curves: {unknown('output', name, known)}")
     chosen = [known[name] for name in dict.fromkeys((*wanted, *slopes))]
     case = replace(case, outputs=tuple(chosen))
-    varied, units = moved_by(case, names)
+    varied, units = moved_by(case, names, shared=True)
     designs = DesignOutputs.of(case, varied.places, slopes=dict.fromkeys(slopes, 1))
     return ReadyCurves(designs, varied, units, slopes)
 
 
-def moved_by(case: Case, names: Sequence[str]) -> tuple[Moves, Mapping[str, str]]:
+def moved_by(
+    case: Case, names: Sequence[str], *, shared: bool = False
+) -> tuple[Moves, Mapping[str, str]]:
     """Return the moves of the geometry by named numbers, and the units of these.
+
+    Args:
+        shared: whether all rows of a table are among its places: programs with these as inputs
+            serve any numbers of a template.
 
     Raises:
         CaseError: there is no such place, or the case drives the absolute position of a point that
@@ -235,11 +241,14 @@ def moved_by(case: Case, names: Sequence[str]) -> tuple[Moves, Mapping[str, str]
         raise CaseError("curves: places names nothing to vary, expected 'lca_front z' or the like")
     geometry = Geometry(case)
     found = [_number(geometry, name) for name in names]
-    varied = Moves.of(geometry.values, by_place([moved for moved, _ in found]))
+    moves = by_place([moved for moved, _ in found])
+    still = geometry.moves([*geometry.rows.values()]) if shared else {}
+    every = {place: np.zeros((len(each), len(names))) for place, each in still.items()}
+    varied = Moves.of(geometry.values, every | moves)
     for driver in case.mechanism.drivers:
         if not isinstance(driver, PointCoordinate) or driver.relative:
             continue
-        if (point := f"points.{driver.point}.position") in varied.places:
+        if (point := f"points.{driver.point}.position") in moves:
             raise CaseError(
                 f"curves: driver {driver.name!r} gives the absolute position of a point that"
                 f" varies, {point}; drive it with relative = true, or leave the point"

@@ -46,7 +46,7 @@ def empty_summary(quantities: int, n: int) -> Summary:
     """Return the summary of no variants."""
     none, unknown = np.zeros((quantities, n)), np.full((quantities, n), np.nan)
     extremes = np.full((quantities, 2), -1, dtype=np.int64)
-    return Summary(none.astype(np.int64), unknown, unknown, unknown, none, extremes)
+    return Summary(none.astype(np.int64), unknown, unknown.copy(), unknown.copy(), none, extremes)
 
 
 def summary_of(values: Array, first: int) -> Summary:
@@ -57,23 +57,26 @@ def summary_of(values: Array, first: int) -> Summary:
         values: shape (quantities, n, V), NaN if missing.
         first: index of the first variant.
     """
-    total = values.sum(axis=2)
-    count, missing = np.full(total.shape, values.shape[2]), None
-    if not np.isfinite(total).all():  # rare: most studies are spared the search for NaN
-        missing = np.isnan(values)
-        total, count = np.nansum(values, axis=2), (~missing).sum(axis=2)
+    found = empty_summary(*values.shape[:2])
+    # one after the other: what is read again is still in the cache
     with np.errstate(all="ignore"):
-        mean = total / count
-        away = values - mean[:, :, None]
-        least, most = np.fmin.reduce(values, axis=2), np.fmax.reduce(values, axis=2)
-    if missing is not None:
-        away[missing] = 0.0
-    extremes = np.full((len(values), 2), -1, dtype=np.int64)
-    for q in np.flatnonzero(count.any(axis=1)).tolist():
-        for k, ends, outermost in ((0, least[q], np.nanargmin), (1, most[q], np.nanargmax)):
-            sample = int(outermost(ends))
-            extremes[q, k] = first + (values[q, sample] == ends[sample]).argmax()
-    return Summary(count, least, most, mean, np.einsum("qnv,qnv->qn", away, away), extremes)
+        for q, each in enumerate(values):
+            total, count, missing = each.sum(axis=1), each.shape[1], None
+            lowest, highest = np.argmin, np.argmax
+            if not np.isfinite(total).all():  # rare: most studies are spared the search for NaN
+                missing, lowest, highest = np.isnan(each), np.nanargmin, np.nanargmax
+                total, count = np.nansum(each, axis=1), (~missing).sum(axis=1)
+            found.count[q], found.mean[q] = count, total / count
+            away = each - found.mean[q, :, None]
+            if missing is not None:
+                away[missing] = 0.0
+            found.squares[q] = np.vecdot(away, away)
+            ends = np.fmin.reduce(each, axis=1), np.fmax.reduce(each, axis=1)
+            found.least[q], found.most[q] = ends
+            for k, outermost in enumerate((lowest, highest) if found.count[q].any() else ()):
+                sample = int(outermost(ends[k]))
+                found.extremes[q, k] = first + (each[sample] == ends[k][sample]).argmax()
+    return found
 
 
 def merge(a: Summary, b: Summary) -> Summary:

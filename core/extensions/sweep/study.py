@@ -253,11 +253,6 @@ class Ready:
         places = study.variation.places
         return Ready(study, DesignOutputs.of(study.case, places, derivative=study.order))
 
-    @property
-    def lanes(self) -> int:
-        """The number of variants solved at once."""
-        return self.outputs.at_once
-
     @cached_property
     def nominal(self) -> Array:
         """The values of the rows at the nominal design, shape (rows, n)."""
@@ -283,8 +278,11 @@ class Ready:
         offsets = study.variation.offsets(study.seed, first, count)
         chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
         found = study.empty_chunk
-        for start in range(0, count, self.lanes):
-            part = slice(start, start + self.lanes)
+        size = -(
+            -count // -(-count // self.outputs.at_once)
+        )  # of equal parts: one executor serves all
+        for start in range(0, count, size):
+            part = slice(start, start + size)
             found += self._part(index, first + start, offsets[:, part], chosen[part])
         return found
 
@@ -301,7 +299,9 @@ class Ready:
             index,
             count,
             summary_of(values, first),
-            (values if chosen.all() else values[:, :, chosen],) if chosen.any() else (),
+            (values if chosen.all() else np.compress(chosen, values, axis=2),)
+            if chosen.any()
+            else (),
             {
                 k: values[:, :, k - first].copy()
                 for k in study.picked.intersection(range(first, first + count))
@@ -348,7 +348,7 @@ def gradients(study: Study) -> Gradients:
     case, variation, path = study.case, study.variation, study.case.sweep.path
     orders = {each.output.name: each.derivative + 1 for each in study.rows}
     made = DesignOutputs.of(case, variation.places, derivative=study.order, slopes=orders)
-    n, start = len(path.times), made.designs.start
+    n, start = len(path.times), made.designs.route.begin
     if start.starts_at_design:  # one sample more, at the design position
         path = Path(path.motions, np.append(path.times, start.time), path.design)
     solved = made.on_path(path).solve(variation.nominal[:, None], study.tol)

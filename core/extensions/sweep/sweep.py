@@ -35,6 +35,7 @@ from ..cluster.distributed import (
     connect_client,
     load_distributed,
 )
+from ..designs.design_batch import start_notes
 from . import results
 from .chunk_files import ParquetStore, Part
 from .conformance import capabilities, histogram, worst_sample
@@ -258,7 +259,9 @@ def sweep_designs(
     with ThreadPoolExecutor(jobs) as pool:  # sorting runs without Python's lock
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
-    run["cases"][case.name]["notes"] += ready.outputs.designs.start_notes(tol)
+    model = ready.outputs.designs.route.model
+    notes = start_notes(case.mechanism, model.request, case.sweep.path, tol)
+    run["cases"][case.name]["notes"] += notes
     measured = _speed_figures(
         study, found.count - earlier, jobs if source is None else None, seconds, processor
     )

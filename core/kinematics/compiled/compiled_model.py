@@ -1,9 +1,9 @@
 """A mechanism made ready to be swept: its rows selected, its programs traced, its lanes laid out.
 
 Programs with their layout are kept on disk beside their machine code. The key of an entry is the
-mechanism, the request and all source files of tracing and of the wanted outputs: a change of any of
-them traces anew. Joints and outputs of the user are traced every time, because their source may be
-anywhere.
+mechanism, without the numbers that vary, the request and all source files of tracing and of the
+wanted outputs: a change of any of them traces anew. Joints and outputs of the user are traced every
+time, because their source may be anywhere.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import pathlib
 import pickle
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -32,7 +32,8 @@ from ...program import ITERATIONS, NODES, Plan, groups_behind
 from ...program.disk_cache import load_or_make
 from ...program.executor import Executor, compiler, ready
 from ...trajectory import Array
-from ..formulation.constraints import Frames
+from ..formulation.constraints import Frames, frames
+from ..formulation.parameters import placed
 from ..formulation.state_vectors import samples
 from ..formulation.styles import MIXED, NATIVE
 from ..structure.degrees_of_freedom import Selection
@@ -52,8 +53,7 @@ from .request import (
     kept_outputs,
     kept_tests,
     row_ranges,
-    rows_of_bodies,
-    rows_of_points,
+    rows_of_motions,
     slots_of,
 )
 
@@ -82,6 +82,7 @@ class Tracing:
             driver.
         rows: name of a motion or test -> its rows among those kept of a sample.
         blocks: of the rows (`Elimination.sigmas`).
+        redundant: number of redundant rows among those that forces are solved by.
     """
 
     plan: Plan
@@ -92,6 +93,7 @@ class Tracing:
     sampled: Sequence[int]
     rows: Mapping[str, slice]
     blocks: int
+    redundant: int
     selection: Selection
     frame: Frames
 
@@ -111,13 +113,23 @@ def load_or_trace(mechanism: Mechanism, request: Request, alike: Alike | None = 
         return _trace(mechanism, request, alike, lanes)
     files = {sys.modules[each].__file__ for each in modules if each.startswith(f"{OURS}.")}
     folders = sorted({os.path.dirname(each) for each in files if each})
-    content = _source(*folders) + pickle.dumps((mechanism, request, lanes))
+    said, own = (mechanism, request, lanes), dict[str, Any]()
+    if request.varied:  # programs of all numbers are the same, but for unit and rows
+        from .programs import Tracer
+
+        tracer = Tracer(mechanism, request)
+        own = {"varied": tracer.geometry, "frame": frames(mechanism), "selection": tracer.selection}
+        zeros = {place: [0.0] * len(numbers) for place, numbers in tracer.geometry.items()}
+        shape = replace(placed(mechanism, zeros), name="")
+        said = shape, request, lanes, tracer.frame.unit, tracer.selection.chosen
+    content = _source(*folders) + pickle.dumps(said)
 
     def made() -> bytes:
         return msgspec.msgpack.encode(_trace(mechanism, request, None, lanes), enc_hook=_plain)
 
     def read(whole: bytes) -> Tracing:
-        return msgspec.msgpack.decode(whole, type=Tracing, dec_hook=lambda kind, ends: kind(*ends))
+        found = msgspec.msgpack.decode(whole, type=Tracing, dec_hook=lambda kind, ends: kind(*ends))
+        return replace(found, **own)
 
     return load_or_make(content, made, read)
 
@@ -237,6 +249,7 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
         sampled,
         rows,
         tracer.blocks,
+        len(tracer.force_rows.selection.dropped) if request.forces else 0,
         tracer.selection,
         tracer.described[1],
     )
@@ -300,14 +313,9 @@ class Model(Tracing):
         self.design = np.full(len(self.slots), np.nan) if request.rows else self._solve_design()
 
     @cached_property
-    def of_points(self) -> Mapping[str, list[slice | None]]:
-        """By point: rows of its position, velocity and acceleration; None for an absent one."""
-        return rows_of_points(self.request, self.rows)
-
-    @cached_property
-    def of_bodies(self) -> Mapping[str, list[slice | None]]:
-        """By body: rows of its r, p, v and a, None for an absent one."""
-        return rows_of_bodies(self.request, self.rows)
+    def motions(self) -> tuple[Mapping[str, list[slice | None]], ...]:
+        """See `rows_of_motions`."""
+        return rows_of_motions(self.request, self.rows)
 
     @cached_property
     def forces(self) -> ForceTable | None:
@@ -317,7 +325,7 @@ class Model(Tracing):
             return None
         from .solution import ForceTable  # most motions are without forces
 
-        return ForceTable(wanted, self.rows, self.frame.unit)
+        return ForceTable(wanted, self.rows, self.redundant)
 
     @property
     def orders(self) -> int:

@@ -322,8 +322,9 @@ class Tracer:
         twists = self.formulation.twists(self.at, v)
         accelerations = self.formulation.accelerations(self.at, v, a)
         states = BodyStates(self.frame, self.at.poses, twists, accelerations)
-        rows = self._native_rows
-        return TracedForces(self.mechanism, rows, states, self.at, self.drives, multipliers)
+        return TracedForces(
+            self.mechanism, self.force_rows, states, self.at, self.drives, multipliers
+        )
 
     def moving(self, v: Sequence[Scalar], a: Sequence[Scalar]) -> Moving:
         """Return the motion of each body at unknown rates v and accelerations a, by its name."""
@@ -337,7 +338,8 @@ class Tracer:
         return found
 
     @cached_property
-    def _native_rows(self) -> Rows:
+    def force_rows(self) -> Rows:
+        """The rows that forces are solved by."""
         if self.request.style == NATIVE:
             return Rows(self.formulation, self.selection, self.factor)
         return native_rows(self.mechanism, self.frame, self.drives, self.at)

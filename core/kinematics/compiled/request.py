@@ -208,12 +208,10 @@ LARGEST_OF_PARTS, SMALLEST_OF_PARTS = (*LARGEST, ITERATIONS), (*SMALLEST, MARGIN
 
 EFFORT, ELEMENT, REACTION = "effort ", "element ", "reaction "
 """Before the names of vectors of forces: of a driver; of a force element; of a joint, its force and
-moment. Those of drivers and joints repeat for each undetermined direction.
+moment, and again in each undetermined direction.
 """
-POWER, REDUNDANT = "power", "redundant"
-"""The vectors of the sum of the powers and the largest of them; and of the products of the
-undetermined directions with the multipliers and, upper triangle by rows, with each other.
-"""
+POWER = "power"
+"""The vector of the sum of the powers and the largest of them."""
 FORCE_SIGMA = "force sigma"
 """The vector of the estimate of the smallest singular value of the rows that forces are solved by,
 where the motion is solved by others.
@@ -237,7 +235,7 @@ def kept_outputs(vectors: Iterable[str]) -> list[str]:
 
 def kept_forces(vectors: Iterable[str]) -> list[str]:
     """Return the names of the vectors of forces, of all vectors."""
-    prefixes, whole = (EFFORT, ELEMENT, REACTION), (POWER, REDUNDANT, FORCE_SIGMA)
+    prefixes, whole = (EFFORT, ELEMENT, REACTION), (POWER, FORCE_SIGMA)
     return [name for name in vectors if name.startswith(prefixes) or name in whole]
 
 
@@ -276,13 +274,11 @@ def row_ranges(motions: Mapping[str, int], tests: Sequence[str]) -> dict[str, sl
     return rows
 
 
-def rows_of_points(request: Request, rows: Mapping[str, slice]) -> dict[str, list[slice | None]]:
-    """Return by point the rows of position, velocity and acceleration; None for an absent one."""
-    return {name: [rows.get(f"{label} {name}") for label in QUANTITIES] for name in request.points}
-
-
-def rows_of_bodies(request: Request, rows: Mapping[str, slice]) -> dict[str, list[slice | None]]:
-    """Return by body the rows of r, p, v and a; None for an absent one.
+def rows_of_motions(
+    request: Request, rows: Mapping[str, slice]
+) -> tuple[dict[str, list[slice | None]], ...]:
+    """Return by point the rows of position, velocity and acceleration, and by body those of r, p, v
+    and a; None for an absent one.
 
     Rates of translation and of rotation stand side by side.
     """
@@ -291,7 +287,10 @@ def rows_of_bodies(request: Request, rows: Mapping[str, slice]) -> dict[str, lis
     def rows_between(first: str, last: str) -> slice | None:
         return slice(rows[first].start, rows[last].stop) if first in rows else None
 
-    return {
+    points = {
+        name: [rows.get(f"{label} {name}") for label in QUANTITIES] for name in request.points
+    }
+    return points, {
         name: [rows_between(f"{first} {name}", f"{last} {name}") for first, last in pairs]
         for name in request.bodies
     }

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,12 +21,10 @@ from .request import (
     FORCE_SIGMA,
     POWER,
     REACTION,
-    REDUNDANT,
     Request,
     kept_motions,
     row_ranges,
-    rows_of_bodies,
-    rows_of_points,
+    rows_of_motions,
 )
 
 _Columns = Mapping[str, Sequence[slice | None]]
@@ -47,8 +44,7 @@ class Columns:
         names = kept_motions(request, ())
         sizes = {name: 4 if name.startswith("p ") else 3 for name in names}
         self.count, self.by_vector = sum(sizes.values()), row_ranges(sizes, ())
-        self.points = rows_of_points(request, self.by_vector)
-        self.bodies = rows_of_bodies(request, self.by_vector)
+        self.points, self.bodies = rows_of_motions(request, self.by_vector)
 
 
 def solution(
@@ -128,25 +124,17 @@ class ForceTable:
 
     Args:
         rows: columns of the table by the name of a vector.
-        unit: of length, in which undetermined directions are given [m].
+        redundant: number of redundant rows.
 
     Attributes:
         least: where the estimate of the smallest singular value is above it, the pose is far from
             singular.
     """
 
-    def __init__(
-        self,
-        wanted: WantedForces,
-        rows: Mapping[str, slice],
-        unit: float,
-    ) -> None:
-        self.wanted, self.rows, self.unit = wanted, rows, unit
+    def __init__(self, wanted: WantedForces, rows: Mapping[str, slice], redundant: int) -> None:
+        self.wanted, self.rows, self.redundant = wanted, rows, redundant
         self._power = rows[POWER].start
-        products = rows[REDUNDANT] if REDUNDANT in rows else slice(0, 0)
-        # with r redundant rows there are r + r (r + 1) / 2 products
-        self.redundant = round((2.0 * (products.stop - products.start) + 2.25) ** 0.5 - 1.5)
-        self.least = WELL_CHOSEN if self.redundant else REGULAR
+        self.least = WELL_CHOSEN if redundant else REGULAR
 
     def read(self, table: Array, sigma: float) -> Forces | None:
         """Return the forces of a table, shape (n, columns), with its NaN; None near a singular
@@ -178,11 +166,7 @@ class ForceTable:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """The forces of the samples in one table.
-
-    Redundant rows allow many multipliers. The shortest are taken, as by singular values: they do
-    not depend on the choice of rows.
-    """
+    """The forces of the samples in one table."""
 
     of: ForceTable
     table: Array
@@ -193,10 +177,9 @@ class _Samples:
 
     def reaction(self, name: str) -> Reaction:
         """Return the reaction of a joint."""
-        values = self._vector(REACTION, name).reshape(-1, 1 + self.of.redundant, 6)
-        si = np.repeat([1.0 / self.of.unit, 1.0], 3)
-        found, free = self._shortest(values.swapaxes(1, 2), si)
-        return Reaction(found[:, :3], found[:, 3:], free)
+        values = self._vector(REACTION, name)
+        free = values[:, 6:].reshape(len(values), self.of.redundant, 6).swapaxes(1, 2)
+        return Reaction(values[:, :3], values[:, 3:6], free)
 
     def effort(self, name: str) -> Array:
         """Return the effort of a driver, shape (n,)."""
@@ -204,34 +187,3 @@ class _Samples:
 
     def _vector(self, kind: str, name: str) -> Array:
         return self.table[:, self.of.rows[kind + name]]
-
-    @cached_property
-    def _basis(self) -> tuple[Array, Array]:
-        """Matrices to orthonormalise the undetermined directions, shape (n, r, r), and the part of
-        each direction in the multipliers, shape (n, r); NaN at samples that were not reached.
-        """
-        r, values = self.of.redundant, self._vector(REDUNDANT, "")
-        known = np.isfinite(values).all(axis=1)
-        gram = np.tile(np.eye(r), (len(values), 1, 1))
-        pairs = [(i, j) for i in range(r) for j in range(i, r)]
-        for k, (i, j) in enumerate(pairs):
-            gram[known, i, j] = gram[known, j, i] = values[known, r + k]
-        to_orthonormal: Array = np.asarray(np.linalg.inv(np.linalg.cholesky(gram)), np.float64)
-        to_orthonormal = to_orthonormal.swapaxes(1, 2)
-        to_orthonormal[~known] = np.nan
-        return to_orthonormal, np.einsum("nkj,nk->nj", to_orthonormal, values[:, :r])
-
-    def _shortest(self, values: Array, si: Array) -> tuple[Array, Array]:
-        """Return the components of the shortest multipliers [SI], shape (n, components), and the
-        undetermined directions, shape (n, components, r).
-
-        Args:
-            values: of all multipliers [SI], then of each undetermined direction, shape (n,
-                components, 1 + r).
-            si: size in SI of the components of a direction, shape (components,).
-        """
-        if not self.of.redundant:
-            return values[..., 0], values[..., 1:]
-        to_orthonormal, part = self._basis
-        free = values[..., 1:] @ to_orthonormal
-        return values[..., 0] - si * np.einsum("nck,nk->nc", free, part), free

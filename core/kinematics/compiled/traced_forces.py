@@ -2,7 +2,8 @@
 
 The rows are factored already: the multipliers of a sample are one transposed solve. Redundant rows
 may carry any multipliers, balanced by the others. Each gives an undetermined direction of the
-multipliers, by one more transposed solve; `ForceTable` orthonormalises these directions.
+multipliers, by one more transposed solve. Without their parts along these directions the
+multipliers are the shortest, as by singular values: they do not depend on the choice of rows.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 
-from ...algebra import Scalar
+from ...algebra import Scalar, root
 from ...joints import AxialJoint
 from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
@@ -23,7 +24,7 @@ from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Frames
 from ..formulation.formulation import Configuration
 from ..structure.degrees_of_freedom import Selection, select_rows
-from .request import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION, REDUNDANT
+from .request import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION
 
 
 def can_trace(mechanism: Mechanism) -> bool:
@@ -78,7 +79,8 @@ class TracedForces:
         states: motion of its bodies.
         at: configuration, with the coordinates of `angles`.
         drives: of the moving drivers.
-        multipliers: of the solved rows; none if they are to be solved.
+        multipliers: of the solved rows; none if they are to be solved. Given ones are taken as they
+            are, with no direction undetermined.
     """
 
     def __init__(
@@ -92,6 +94,7 @@ class TracedForces:
     ) -> None:
         self._mechanism, self._rows, self._states, self._drives = mechanism, rows, states, drives
         self._equations = ForceEquations.with_angles(mechanism, rows.formulation, at, states)
+        self._left_out = () if multipliers else rows.selection.dropped
         self.multipliers = multipliers or rows.factor.solve_transposed(self._equations.demand)
 
     def moved(self, follow: Callable[[Sequence[Scalar]], Sequence[Scalar]]) -> list[Scalar]:
@@ -113,15 +116,20 @@ class TracedForces:
         return self._of_rows(self.multipliers)
 
     @cached_property
-    def _loose(self) -> list[list[Scalar]]:
-        """Return balanced multipliers of all rows, by row left out."""
+    def _undetermined(self) -> list[list[Scalar]]:
+        """Return orthonormal balanced multipliers of all rows, one for each row left out.
+
+        Each has a row that those before lack, so none is short, and one projection is enough.
+        """
         found = list[list[Scalar]]()
-        for left_out in self._rows.selection.dropped:
+        for left_out in self._left_out:
             row = self._equations.rows[left_out]
             right = [-row.get(k, 0.0) for k in range(self._equations.formulation.unknowns)]
             multipliers = self._of_rows(self._rows.factor.solve_transposed(right))
             multipliers[left_out] = 1.0
-            found.append(multipliers)
+            multipliers = _without(multipliers, found)
+            scale = 1.0 / root(_product(multipliers, multipliers))
+            found.append([scale * x for x in multipliers])
         return found
 
     def _of_rows(self, chosen: Sequence[Scalar]) -> list[Scalar]:
@@ -133,7 +141,7 @@ class TracedForces:
     def vectors(self, wanted: WantedForces) -> Iterator[tuple[str, list[Scalar]]]:
         """Yield the vectors of all wanted forces by name."""
         mechanism, equations = self._mechanism, self._equations
-        every = [self._multipliers, *self._loose]
+        every = [_without(self._multipliers, self._undetermined), *self._undetermined]
         efforts = {
             driver.name: equations.effort(driver, self._multipliers) for driver in mechanism.drivers
         }
@@ -159,8 +167,6 @@ class TracedForces:
         yield POWER, [sum(found, 0.0), reduce(maximum, sizes, 0.0)]
         if self._rows.own:
             yield FORCE_SIGMA, [self._rows.factor.sigma]
-        if self._loose:
-            yield REDUNDANT, [*self._products()]
 
     def _rate(self, driver: str) -> Scalar:
         """The rate of a driver [SI]."""
@@ -168,12 +174,14 @@ class TracedForces:
         turns = self._mechanism.driver(driver).turns
         return rate if turns else self._states.frame.unit * rate
 
-    def _products(self) -> Iterator[Scalar]:
-        for each in self._loose:
-            yield _product(each, self._multipliers)
-        for k, each in enumerate(self._loose):
-            for other in self._loose[k:]:
-                yield _product(each, other)
+
+def _without(a: Sequence[Scalar], basis: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+    """Return a vector without its parts along orthonormal ones."""
+    found = [*a]
+    for each in basis:
+        part = _product(each, found)
+        found = [x - part * y for x, y in zip(found, each, strict=True)]
+    return found
 
 
 def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

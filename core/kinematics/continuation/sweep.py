@@ -72,8 +72,7 @@ def _follow(route: Route, tol: float) -> Trajectory:
     forces = model.forces.read(table, sigma) if finite and model.forces else None
     return solution(
         table,
-        model.of_points,
-        model.of_bodies,
+        *model.motions,
         unit=model.frame.unit,
         solved=found.solved,
         iterations=found.kept[rows[ITERATIONS].start],

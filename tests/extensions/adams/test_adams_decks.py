@@ -1,5 +1,5 @@
-"""Decks of Project Chrono against the results of ADAMS beside them; `python -m tests.adams_decks`
-prints the table.
+"""Decks of Project Chrono against the results of ADAMS beside them;
+`python -m tests.extensions.adams.decks` prints the table.
 """
 
 import re
@@ -9,7 +9,7 @@ import pytest
 from kincheck import CaseError
 from kincheck.core.case.models.files import load
 
-from ...adams_decks import DECKS, WITHOUT_RESULTS, judged, line
+from .decks import DECKS, WITHOUT_RESULTS, judged, line
 
 # Springs whose results are of other numbers: the free force gives them away.
 OTHER_SPRINGS = ("RotSpring_Case01", "TranSpring_Case01")

@@ -8,8 +8,8 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 
-from ...adams_decks import DECKS
 from ...support.case_texts import write
+from .decks import DECKS
 
 NAME, PLACES = "zq_unknown", 12
 

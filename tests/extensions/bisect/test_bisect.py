@@ -109,6 +109,7 @@ def test_odd_releases_are_told(offline, capsys):
     assert "nowhere-to-be-found" in said
 
 
+@pytest.mark.nightly
 def test_end_that_cannot_be_installed(offline, capsys):
     """And native completes a truth without rates."""
     case(offline, "places", columns=2)
@@ -148,6 +149,7 @@ BAD = (
 )
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(("words", "message"), BAD)
 def test_bad_input_is_refused(offline, capsys, words, message):
     for release in (1, 2):

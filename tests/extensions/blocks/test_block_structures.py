@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import solve
-from kincheck.core.extensions.laboratory.bench.size import pivot, ring
+from kincheck.core.extensions.laboratory.bench.size import LEAN, pivot, ring
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
@@ -15,8 +15,7 @@ from kincheck.core.kinematics.continuation.singular_samples import scrutinise
 from kincheck.core.kinematics.continuation.walk import follow_samples
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 
-from ...support.block_structures import LEAN, assert_alike, solve_as, torus, with_one_program
-from ...support.by_night import sparse_by_day
+from ...support.block_structures import assert_alike, solve_as, torus, with_one_program
 from ...support.mechanisms import (
     BRANCH,
     chain,
@@ -42,15 +41,13 @@ IN_BLOCKS = pytest.mark.parametrize("method", METHODS[1:])
 
 # several drivers, redundant rows, all kinds of joints, a sweep that does not start at the design
 @IN_BLOCKS
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     "name",
-    sparse_by_day(
-        [
-            *("mcpherson_steered", "mcpherson_strut", "bricard", "four_bar"),
-            *("andrews_squeezer", "delta_robot", "double_cardan", "rssr"),
-        ],
-        2,
-    ),
+    [
+        *("mcpherson_steered", "mcpherson_strut", "bricard", "four_bar"),
+        *("andrews_squeezer", "delta_robot", "double_cardan", "rssr"),
+    ],
 )
 def test_blocks_match_one_program(name, method):
     case = cases.load(name)
@@ -91,6 +88,7 @@ def test_blocks_by_numpy(method, mechanism, point, body):
     assert_alike(*found)
 
 
+@pytest.mark.by_day(2)
 @IN_BLOCKS
 @pytest.mark.parametrize(
     "times",
@@ -135,9 +133,8 @@ def test_limit_of_travel_has_one_verdict(method):
     assert np.isnan(details).all()
 
 
-@pytest.mark.parametrize(
-    "size", sparse_by_day([(2, 2, 2), (2, 3, 1), (3, 3, 3)], 3), ids=["2x2", "2x3", "3x3"]
-)
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("size", [(2, 2, 2), (2, 3, 1), (3, 3, 3)], ids=["2x2", "2x3", "3x3"])
 def test_torus_has_one_verdict(size):
     """Singular values vanish in pairs and in threes: neither pivots nor signs of determinants show
     it, estimates of singular values do.
@@ -177,8 +174,9 @@ def test_bennett_loop_has_one_verdict():
             assert np.abs(found.points[name].position - motion.position).max() <= 1e-11
 
 
+@pytest.mark.by_day(6)
 @pytest.mark.parametrize(
-    "shape", sparse_by_day(product([(0.0, 9), (1e-6, 5), (1e-4, 5)], ["distance", "hinges"]), 6, 3)
+    "shape", [*product([(0.0, 9), (1e-6, 5), (1e-4, 5)], ["distance", "hinges"])]
 )
 def test_parallelogram_in_ring_has_one_verdict(shape):
     (off, reached), ends = shape

@@ -36,6 +36,7 @@ EVERY = [*OWN, *(case.mechanism for case in probes())]
 """The probes have joints of all types, one by one."""
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("mechanism", EVERY, ids=lambda each: each.name)
 def test_elements_match_whole_equations(mechanism):
     drivers = tuple(each.name for each in mechanism.drivers)

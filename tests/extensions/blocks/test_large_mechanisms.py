@@ -2,6 +2,7 @@
 each other, step over no singular pose, and refuse what residuals leave uncertain.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -11,21 +12,26 @@ from kincheck.core import (
     Distance,
     Gear,
     Inline,
+    JointAngle,
     JointDisplacement,
     Mechanism,
     Point,
     Revolute,
+    Screw,
     SolveError,
     Spherical,
+    Table,
     Translational,
     Universal,
     solve,
     solve_designs,
 )
+from kincheck.core.extensions.blocks import component_lanes, sparse_lanes
 from kincheck.core.extensions.blocks.sparse_lanes import POSES, SparseLanes, falling
 from kincheck.core.extensions.blocks.sparse_lu import Blocks
 from kincheck.core.extensions.blocks.sweep import Lanes
-from kincheck.core.extensions.laboratory.bench.size import LEAN, pivot, ring
+from kincheck.core.extensions.laboratory.bench.size import LEAN, circle, pivot, ring
+from kincheck.core.harness.record import Results
 from kincheck.core.kinematics.formulation.acceptance_criteria import least_slope
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import frames
@@ -35,9 +41,21 @@ from kincheck.core.kinematics.structure.degrees_of_freedom import NullSpaces
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.trajectory import QUANTITIES
 
+from ...report.page import report
 from ...support.block_structures import chain_of_hinges, solve_sparse
-from ...support.by_night import sparse_by_day
-from ...support.mechanisms import Z, circles_meet, crank_tip, errors, planar_four_bar, solve_all
+from ...support.mechanisms import (
+    ORIGIN,
+    X,
+    Z,
+    chain,
+    circles_meet,
+    crank_tip,
+    errors,
+    indexing,
+    planar_four_bar,
+    solve_all,
+)
+from ...support.strut_results import record
 
 CRANKS = 5
 """A small ring is solved as one sparse system on request; the front door does so from 40 bodies."""
@@ -164,18 +182,16 @@ def test_parallelogram_in_line_goes_on(ends, grid):
 
 
 # where the rod's arms are in line with it, what is nearly a parallelogram turns back
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     "shape",
-    sparse_by_day(
-        [
-            ("coarse", "hinges", 1e-6, 0.57053),
-            ("middle", "distance", 1e-6, 0.57053),
-            ("fine", "hinges", 1e-6, 0.57053),
-            ("coarse", "distance", 1e-4, 0.56846),
-            ("middle", "hinges", 1e-4, 0.56846),
-        ],
-        3,
-    ),
+    [
+        ("coarse", "hinges", 1e-6, 0.57053),
+        ("middle", "distance", 1e-6, 0.57053),
+        ("fine", "hinges", 1e-6, 0.57053),
+        ("coarse", "distance", 1e-4, 0.56846),
+        ("middle", "hinges", 1e-4, 0.56846),
+    ],
     ids=str,
 )
 def test_sparse_gap_ends_motion(shape):
@@ -249,6 +265,7 @@ def test_undriven_ring_names_freedom(cranks):
         solve(replace(ring(cranks), drivers=()), "turn", [0.0])
 
 
+@pytest.mark.nightly
 def test_designs_of_large_ring():
     """What is known of sigma of many variants at once leaves all samples of such a ring in doubt.
     Designs that end early say why.
@@ -442,3 +459,89 @@ def test_slopes_fall_lane_by_lane():
         np.testing.assert_array_equal(known[:, k], slope)
         slope = np.maximum(seen[:, k], least_slope(slope))
         np.testing.assert_array_equal(after[:, k], slope)
+
+
+def indexed(turns):
+    """The turns between time zero and one, and rest before and after."""
+    rest = np.arange(-40.0, 41.0) * 0.01
+    values = np.repeat([0.0, 2.0 * np.pi * turns], len(rest))
+    return Table(tuple(np.concatenate([rest, 1.0 + rest])), tuple(values))
+
+
+@pytest.mark.parametrize(
+    ("cranks", "turns", "count"), [(9, 1, 2), (9, -4, 11), (22, -2, 2), (22, 1, 11)]
+)
+def test_ring_counts_turns_between_samples(cranks, turns, count):
+    """A nut beside a ring, whose lead tells the turns: as one program, and as a sparse system."""
+    whole, lead, last = ring(cranks), 0.01, 0.01
+    joints = [
+        Screw("thread", "ground", "driven", ORIGIN, Z, lead=lead),
+        Translational("guide", "ground", "slide", Z, X),
+    ]
+    mechanism = replace(
+        whole,
+        bodies=[*whole.bodies, *indexing().bodies[1:]],
+        joints=[*whole.joints, *joints],
+        points=[Point("mark", "driven", (0.2, 0.0, 0.0))],
+        drivers=[
+            *whole.drivers,
+            JointDisplacement("clock", "guide"),
+            JointAngle("index", "thread"),
+        ],
+    )
+    values = np.linspace(0.0, last, count)
+    found = solve_all(mechanism, "clock", values, rate=last, motions={"index": indexed(turns)})
+    assert ("factor_entries" in found.details) == (cranks == 22)
+    assert found.points["mark"].position[-1] == pytest.approx([0.2, 0.0, lead * turns], abs=1e-14)
+
+
+def calls(monkeypatch, owner, name):
+    """The arguments of all calls from now on."""
+    every, call = [], getattr(owner, name)
+    monkeypatch.setattr(
+        owner, name, lambda *given, **named: (every.append(given), call(*given, **named))[1]
+    )
+    return every
+
+
+@pytest.mark.parametrize(
+    ("large", "kind"),
+    [
+        (chain(21), component_lanes.ComponentLanes),
+        (circle(22).mechanism, sparse_lanes.SparseLanes),
+    ],
+    ids=["components", "sparse"],
+)
+def test_cache_keeps_last_large_mechanism(large, kind, monkeypatch):
+    made = calls(monkeypatch, kind, "__init__")
+    values, driver = np.linspace(-0.1, 0.2, 9), large.drivers[0].name
+    first = solve(large, driver, values).points
+    other = solve(large, driver, values[::2]).points
+    again = solve(large, driver, values).points
+    assert len(made) == 1
+    for name, motion in first.items():
+        np.testing.assert_array_equal(again[name].acceleration, motion.acceleration)
+        # predicted from other samples: round-off, by the condition and once more for each
+        # derivative
+        assert np.abs(other[name].acceleration - motion.acceleration[::2]).max() <= 1e-10
+    with ThreadPoolExecutor(1) as threads:
+        threads.submit(solve, large, driver, values).result()
+    assert len(made) == 2
+
+
+@pytest.mark.parametrize("mechanism", [chain(21), ring(24)], ids=["components", "sparse"])
+def test_page_of_large_mechanism_has_programs(mechanism, tmp_path):
+    """What the native engine really tells of them."""
+    details = solve(mechanism, "turn", [0.0], points=()).details
+    assert ("components" in details) != ("factor_entries" in details)
+    page = report(
+        Results(
+            run={},
+            records=[record("large", "consensus_only", "native", 0.0, [0.0], details=details)],
+        ),
+        tmp_path,
+    )
+    for name, size in details["program"].items():
+        assert name in page.text
+        assert str(size["flops"]) in page.text
+    assert details["dof_account"]["paper"].replace("-", "−") in page.text

@@ -20,7 +20,6 @@ from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Planar, Screw, Universal
 from kincheck.core.studies.checks.findings import Verdict
 
-from ...support.by_night import sparse_by_day
 from ...support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped
 from ...support.fakes import Fake, crank, swept
 from ...support.faulty_engine import Odd, Shy, Sound
@@ -198,13 +197,15 @@ def two(in_process, patch):
     reduce(patch, Screw, Universal, force_type=Universal)
 
 
-@pytest.mark.parametrize("fault", sparse_by_day(OF_MOTION, 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("fault", OF_MOTION)
 def test_check_engine_finds_fault_of_motion(fault, two, patch):
     patch.setattr(checking, "force_cases", list)
     assert failures(Wrapped(fault))
 
 
-@pytest.mark.parametrize("fault", sparse_by_day(OF_FORCES, 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("fault", OF_FORCES)
 def test_check_engine_finds_fault_of_forces(fault, two, patch):
     patch.setattr(checking, "probes", list)
     patch.setattr("kincheck.core.extensions.check_engine.command.TOPOLOGIES", {})
@@ -213,6 +214,7 @@ def test_check_engine_finds_fault_of_forces(fault, two, patch):
     assert not any(check.startswith(("rates: ", "refusal: ")) for check in found)
 
 
-@pytest.mark.parametrize("change", ["no fault, with bodies", *sparse_by_day(["", *HARMLESS], 3)])
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("change", ["no fault, with bodies", "", *HARMLESS])
 def test_check_engine_passes_harmless_changes(change, two):
     assert failures(Wrapped(change)) == set()

@@ -115,6 +115,7 @@ def assert_equal(found, expected):
     assert np.abs((found - expected) / scale)[known].max() < CLOSE
 
 
+@pytest.mark.by_day(2)
 @compiled
 @pytest.mark.parametrize("name", SOME)
 def test_c_of_case_equals_native(name, tmp_path):
@@ -378,6 +379,7 @@ def test_export_of_code_is_refused(argv, said, tmp_path, monkeypatch, capsys):
     assert [*tmp_path.iterdir()] == []
 
 
+@pytest.mark.by_day(3)
 @compiled
 @pytest.mark.parametrize("rate", [0.0, 1.0, -3.0])
 @pytest.mark.parametrize("name", ["mcpherson_strut_loaded", "planar_slider_crank"])

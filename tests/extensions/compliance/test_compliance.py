@@ -22,7 +22,6 @@ from kincheck.core.mechanism.loads import Bushing
 from kincheck.core.mechanism.mechanism import Point
 
 from ...kinematics.test_bushings import bushed
-from ...support.by_night import sparse_by_day
 from ...support.engine_motion import SIMULATORS, installed
 
 DATA = Path(__file__).parents[2] / "data" / "elastokinematics"
@@ -148,7 +147,8 @@ def test_kc_constant_load_acts_over_travel(tmp_path):
 LOADS = product(["lateral", "longitudinal", "braking", "aligning"], ["iso8855", "sae_j670"])
 
 
-@pytest.mark.parametrize("given", sparse_by_day(LOADS, 3), ids=str)
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("given", [*LOADS], ids=str)
 def test_slopes_by_load_equal_differences(tmp_path, given):
     load, convention = given
     case = strut(tmp_path, WHEEL.replace("CONVENTION", convention))
@@ -341,6 +341,7 @@ def load_cases(tmp_path_factory):
     return found
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", [*SIMULATORS, "exudyn-static"])
 def test_engine_equilibria_equal_data(load_cases, name):
     """Wheel centre and load by its own kinematics, gravity and rows, for four load cases."""

@@ -18,7 +18,6 @@ from kincheck.core.doors import offers
 from kincheck.core.joints import Coupler
 from kincheck.core.mechanism.loads import ELEMENTS
 
-from ...support.by_night import sparse_by_day
 from ...support.engine_motion import SIMULATORS, installed
 from ...support.one_freedom import (
     ARM,
@@ -99,6 +98,7 @@ def test_run_equals_closed_form(engine, name, tmp_path):
             assert found == pytest.approx(values, rel=1e-10, abs=1e-11), output
 
 
+@pytest.mark.by_day(3)
 @EVERY
 @pytest.mark.parametrize("engine", ENGINES)
 def test_equilibrium_equals_root(engine, name, tmp_path):
@@ -111,7 +111,8 @@ def test_equilibrium_equals_root(engine, name, tmp_path):
     assert record.outputs["tip.z"].position == pytest.approx([height], abs=1e-13)
 
 
-@pytest.mark.parametrize("name", sparse_by_day(SUBJECTS, 12))
+@pytest.mark.by_day(12)
+@pytest.mark.parametrize("name", SUBJECTS)
 def test_free_motion_equals_integration(name, tmp_path):
     times = np.linspace(0.0, 0.5, 6)
     free = {"duration": 0.5, "samples": 6, "rates": {"pin": RATE}}
@@ -135,6 +136,7 @@ def lifted(tmp_path, subject):
     )
 
 
+@pytest.mark.by_day(3)
 @EVERY
 def test_kc_equals_virtual_work(name, tmp_path):
     """The load F of the wheel has F dz = (V' - Q) dq."""
@@ -166,6 +168,7 @@ def test_kc_passes_in_engines(engine, name, tmp_path):
     assert record.outcome.value == "pass", record.message
 
 
+@pytest.mark.by_day(3)
 @EVERY
 def test_sweep_of_designs_equals_closed_form(name, tmp_path, capsys):
     """The tip is 5 mm higher in half of the variants; a number of the element varies if it can."""
@@ -211,6 +214,7 @@ def test_reference_is_proved_or_refused(name, tmp_path, capsys):
             assert proved == pytest.approx(values, rel=1e-13, abs=1e-14), (output, quantity)
 
 
+@pytest.mark.by_day(3)
 @EVERY
 @pytest.mark.parametrize("to", offers("writers"))
 def test_export_holds_or_names_it(to, name, tmp_path, capsys):
@@ -233,6 +237,7 @@ def test_export_holds_or_names_it(to, name, tmp_path, capsys):
         assert "x" in text
 
 
+@pytest.mark.by_day(3)
 @EVERY
 @pytest.mark.parametrize(
     "to", ["osim", *(pytest.param(each, marks=pytest.mark.nightly) for each in TREES)]

@@ -16,8 +16,6 @@ from kincheck.core.extensions.design.likely import most_likely
 from kincheck.core.extensions.design.rig import read_rig
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
-from ...support.by_night import sparse_by_day
-
 DEG = np.pi / 180.0
 NOISE = {"toe": 0.005 * DEG, "camber": 0.01 * DEG, "half_track_change": 5e-5}
 SIZES = {"toe": ("deg", DEG), "camber": ("deg", DEG), "half_track_change": ("mm", 1e-3)}
@@ -102,6 +100,7 @@ def test_fit_intervals_hold_known_table(bench):
     assert max(found.deviations.values()) <= DRAWING
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("name", "change", "size"),
     [
@@ -196,7 +195,8 @@ SLIDES = {
 }
 
 
-@pytest.mark.parametrize("template", sparse_by_day(SLIDES, step=5, first=1))
+@pytest.mark.by_day(5)
+@pytest.mark.parametrize("template", SLIDES)
 def test_fit_null_directions_are_exact(tmp_path, template):
     case = kincheck.load(table(tmp_path, template))
     random = np.random.default_rng(7)
@@ -276,6 +276,7 @@ def test_fit_written_table_gives_curves(bench, tmp_path, capsys):
         assert np.sqrt(np.mean((found[name][0] - values[name]) ** 2)) < 1.5 * noise
 
 
+@pytest.mark.nightly
 def test_fit_right_wheel_is_mirrored(bench, tmp_path):
     file, _, values, _ = bench
     rig = rig_file(tmp_path / "rig.csv", values)

@@ -249,6 +249,7 @@ ROUGH = {
 }
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("values", "compiled", "order"),
     [

@@ -55,6 +55,7 @@ def balance(moment, force):
     return brentq(lambda turn: moment(turn) - 0.4 * force * math.cos(turn), **ends)
 
 
+@pytest.mark.by_day(3)
 @ENGINES
 @pytest.mark.parametrize(
     ("element", "load", "moment"),

@@ -5,6 +5,9 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import kincheck
+import kincheck.adapters
+import kincheck.core
 import numpy as np
 import pytest
 from kincheck import cases
@@ -31,7 +34,7 @@ from kincheck.core.case.quantity import with_markers
 from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.explain.diagnose import determinacy, diagnose
-from kincheck.core.extensions.explain.rank import Ranks
+from kincheck.core.extensions.explain.rank import Ranks, free_motions
 from kincheck.core.extensions.explain.text import _directions, _forces
 from kincheck.core.harness.native_engine import explain
 from kincheck.core.harness.record import Outcome
@@ -413,6 +416,7 @@ TWO = "points = [[1.115, 0.665, 0.118], [1.14, 0.355, 0.1455]]"
 ONE = "point = [1.115, 0.665, 0.118]"
 
 
+@pytest.mark.nightly
 def test_explain_finds_library_cases_sound(capsys):
     for name in ("four_bar", "bricard", "delta_robot", "mcpherson_suspension"):
         assert main(["explain", name, "--samples", "3"]) == 0
@@ -502,3 +506,19 @@ def test_determinacy_table_names_directions(capsys):
     assert _directions(np.eye(3).tolist()) == "all"
     assert _directions([[0.0, 0.0, -1.0]]) == "[0, 0, 1]"
     assert _directions([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]) == "all across [0, 0, 1]"
+
+
+def test_free_motions_are_reported_separately():
+    """Three motions of two columns each, in a null space whose orthonormal basis mixes them."""
+    rng = np.random.default_rng(7)
+    apart = np.kron(np.eye(3), [[1.0, -1.0]])  # each row ties two columns together
+    found = free_motions(rng.normal(size=(3, 3)) @ apart)
+    assert found.shape == (3, 6)
+    assert np.abs(apart @ found.T).max() <= 1e-14
+    assert ((np.abs(found) > 1e-12).sum(axis=1) == 2).all()
+
+
+def test_explain_of_built_in_case():
+    found = kincheck.explain("rssr", samples=3)
+    assert len(found.samples) == 3
+    assert not found.findings

@@ -31,7 +31,6 @@ from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation
 
 from ...oracles.naive import A
-from ...support.by_night import sparse_by_day
 from ...support.case_texts import write
 from ...support.engine_motion import cutting, mechanism_of
 from ...support.exported import READERS, read
@@ -192,7 +191,8 @@ NO_CURVE = {"exudyn": "Exudyn", "sdf": "SDF"}
 NOT_WRITTEN = {"polynomial": NO_CURVE, "spline": NO_CURVE | {"mjcf": "MJCF"}}
 
 
-@pytest.mark.parametrize("which", sparse_by_day(product(READERS, CASES, (False, True)), 3), ids=str)
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("which", [*product(READERS, CASES, (False, True))], ids=str)
 def test_written_model_closes_at_native_pose(which, tmp_path):
     to, name, elsewhere = which
     if refused := NOT_WRITTEN.get(name, {}).get(to):
@@ -217,9 +217,7 @@ def test_polynomial_coupler_shifted_to_start():
 JOINTS = [each.name for each in probes()]
 
 
-@pytest.mark.parametrize(
-    "which", sparse_by_day(product(JOINTS, ["mjcf", "urdf", "sdf", "osim"]), 3), ids="-".join
-)
+@pytest.mark.parametrize("which", [*product(JOINTS, ["mjcf", "urdf", "sdf", "osim"])], ids="-".join)
 def test_written_joint_closes_loop(which, tmp_path):
     """As it carries a body elsewhere."""
     name, to = which
@@ -303,6 +301,7 @@ def carried(case, again):
     return motions
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", sorted(Joint.registry))
 def test_urdf_loop_read_again_moves_alike(name, tmp_path):
     """The joint closes a loop: the conditions beside the URDF tell its freedoms."""
@@ -316,7 +315,8 @@ def test_urdf_loop_read_again_moves_alike(name, tmp_path):
     assert max(np.ptp(motion.p, axis=0).max() for motion in motions.values()) > 1e-5
 
 
-@pytest.mark.parametrize("pair", sparse_by_day(PAIRS, 5), ids="-".join)
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 def test_export_read_again_moves_alike(pair, tmp_path):
     name, kind = pair
     case = cases.load(name)

@@ -158,6 +158,7 @@ APART = {("simbody", "osim", "by hand"), ("kincheck", "osim", "by hand"), ("dart
 """OpenSim's documents are long, and DART reads SDF up to 1.6: exports are of 1.11."""
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     ("reader", "format", "write"),
     [

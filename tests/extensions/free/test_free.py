@@ -75,6 +75,7 @@ def test_reactions_with_redundant_rows_obey_newton():
     assert np.abs(forces.power).max() < 1e-10
 
 
+@pytest.mark.nightly
 def test_free_body_turns_by_jacobi_functions():
     # Landau & Lifshitz, Mechanics, section 37: M^2 > 2 E I2, started where w2 = 0
     I1, I2, I3 = 0.3, 0.5, 0.7

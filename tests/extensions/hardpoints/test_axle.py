@@ -125,6 +125,7 @@ def assert_close(found, sample, true, atol):
     assert values == pytest.approx(true, abs=atol, rel=1e-11)
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("motion", ["heave", "roll", "steer"])
 @pytest.mark.parametrize("name", RODS)
 def test_axle_outputs_in_closed_form(tmp_path, name, motion):
@@ -422,6 +423,7 @@ script | % the car | {corner}.{name} = [{x} {y} {z}];
 WORDS = {"F": "Front", "R": "Rear"}, {"L": "Left", "R": "Right"}
 
 
+@pytest.mark.by_day(4)
 @pytest.mark.parametrize("corner", CORNERS)
 @pytest.mark.parametrize(("head", "form"), rows(TABLES))
 def test_corner_of_car_table_is_read(tmp_path, head, form, corner):

@@ -11,12 +11,13 @@ import pytest
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
-from kincheck.core.errors import KincheckError
+from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.extensions.compliance.study import compliance
+from kincheck.core.extensions.hardpoints.rubber import with_bushings
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.mechanism.loads import SpringDamper
 
-from ...support.case_texts import rows, write
+from ...support.case_texts import BASE, INLINE, rows, write
 from ...support.sources import ROOT
 
 AXLE = json.loads((ROOT / "tests/data/elastokinematics/8_hmmwv_axle.json").read_text())
@@ -190,3 +191,10 @@ def test_kc_lists_slopes_without_value(tmp_path, capsys):
     assert len(found["travel"]) == 25
     assert not {"spring_ratio.per_travel"} & {*found["outputs"], *found["rigid"]}
     assert all(None not in each["position"] for each in found["outputs"].values())
+
+
+def test_bushings_of_case_have_no_roles(tmp_path):
+    case = load(write(tmp_path, BASE + INLINE))
+    file = write(tmp_path, "[bushings.guide]\nstiffness = 1\n", "b.toml")
+    with pytest.raises(CaseError, match="bushings: unknown key, expected joints"):
+        with_bushings(case, file)

@@ -21,5 +21,5 @@ def test_definitions_have_every_output():
 
 def test_drawings_of_definitions_are_there():
     found = re.findall(r"\]\(\.\./(figures/\w+\.svg)\)", PAGE)
-    assert len(found) == 5
+    assert len(found) == 6
     assert all((DOCS / each).is_file() for each in found)

@@ -176,6 +176,7 @@ def plain(folder, points, **more):
     return load(write(folder, text, "plain.csv"), said)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", FORMS)
 def test_guess_is_the_plain_suspension(tmp_path, name):
     text, points = FORMS[name]

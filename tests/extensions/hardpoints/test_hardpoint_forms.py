@@ -271,3 +271,21 @@ def test_german_names_of_curves(tmp_path):
     found, notes = with_curve(case, curve, CurveOptions())
     assert {*found.reference} == {"toe", "camber"}
     assert "read stroke [mm], toe [deg, column 'Vorspur [°]'], camber" in notes[0]
+
+
+def line_with(text, number):
+    (line,) = (k for k, line in enumerate(text.splitlines(), 1) if str(number) in line)
+    return line
+
+
+@pytest.mark.parametrize("ending", ["json", "yaml"])
+@pytest.mark.parametrize("head", ["", '{"units": "mm",\n"points":'])
+def test_point_in_list_has_line(tmp_path, ending, head):
+    """Of a list of points, alone or in a table; YAML reads JSON."""
+    pytest.importorskip("yaml")
+    points = [{"name": f"p{k}", "x": 1, "y": 2, "z": "1e999" if k == 2 else 3} for k in range(4)]
+    text = f"{head}\n{json.dumps(points, indent=0)}{'}' * bool(head)}"
+    line = line_with(text, "1e999")
+    said = rf"line {line}: (points)?\[2\]\.z \((points\.)?p2\.z\): found '1e999'"
+    with pytest.raises(CaseError, match=said):
+        read_hardpoints(write(tmp_path, text, f"points.{ending}"))

@@ -9,10 +9,11 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.hardpoints.rows import MOST_LINES
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.kinematics import solve
 
-from ...support.case_texts import complains, rows, supplied
+from ...support.case_texts import complains, rows, supplied, write
 from ...support.rods_of_templates import CLOSE, DATA, carrier_of
 
 CHRONO = ("macpherson_strut", "double_wishbone", "multi_link", "sedan_double_wishbone")
@@ -349,3 +350,11 @@ def test_run_command_reads_hardpoint_table(tmp_path, capsys):
     assert "left out: nothing" in capsys.readouterr().err
     assert main(["run", "mcpherson_strut", *options]) == 2
     assert "built-in case" in capsys.readouterr().err
+    assert main(["run", str(file), *options, "--units", "mm", "--reactions"]) == 2
+    said = capsys.readouterr().err
+    assert "Write a case file, kincheck import TABLE > case.toml, and there" in said
+
+
+def test_table_of_many_lines_is_refused(tmp_path):
+    file = write(tmp_path, "a 1 2 3\n" * (MOST_LINES + 1), "table.dat")
+    complains(file, f"found {MOST_LINES + 1} lines", Supplied())

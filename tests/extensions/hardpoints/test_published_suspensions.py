@@ -173,7 +173,7 @@ def test_mcpherson_strut_to_50_digits(tmp_path):
     file = tmp_path / "strut.csv"
     file.write_text(STRUT)
     found = curves(load(file, Supplied(travel="0.08:33", wheel_radius="0.3")))
-    lines = (kincheck.cases.FOLDER / "mcpherson_suspension.csv").read_text().splitlines()
+    lines = kincheck.cases.file("mcpherson_suspension").with_suffix(".csv").read_text().splitlines()
     rows = [*csv.DictReader(line for line in lines if not line.startswith("#"))]
     for name in ("toe", "camber", "caster", "kingpin_inclination", *ROAD):
         true = np.array([float(row[name]) for row in rows])

@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from ...oracles.naive import A
 from ...report.test_report_scene import AXIS, STRUT, UP
 from ...support.mechanisms import chain
-from ...support.strut_results import GRID, record, series
+from ...support.strut_results import GRID, record, results, series
 
 
 @pytest.mark.parametrize(
@@ -156,3 +156,16 @@ def test_scene_mirrored_bodies_share_colours(tmp_path):
     kinds = [colours[f"left_{name}"] for name in ("uca", "lca", "knuckle")]
     assert [colours[f"right_{name}"] for name in ("uca", "lca", "knuckle")] == kinds
     assert len({*kinds}) == 3
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("axle", "named"), [(None, True), ("heave", False)])
+def test_crowded_names_begin_hidden(visit, tmp_path, axle, named):
+    """Those of a strut's few points have room, those of an axle have not."""
+    (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["double_wishbone"]), "utf-8")
+    case = load(tmp_path / "car.csv", Supplied(axle=axle)) if axle else cases.load("four_bar")
+    told = visit(
+        replace(results(), scenes={"strut": scene(case, poses=False)}),
+        "return one('[data-layer=names]').checked;",
+    )
+    assert told == named

@@ -270,7 +270,7 @@ def test_strut_outputs_match_reference():
 def test_strut_reference_matches_sixty_digits():
     lines = [
         line
-        for line in (cases.FOLDER / "mcpherson_suspension.csv").read_text().splitlines()
+        for line in cases.file("mcpherson_suspension").with_suffix(".csv").read_text().splitlines()
         if not line.startswith("#")
     ]
     table = [row for row in csv.DictReader(lines) if float(row["stroke"]) in (-0.08, 0.045)]

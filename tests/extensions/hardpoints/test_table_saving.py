@@ -5,8 +5,13 @@ table; read back equal.
 import openpyxl
 import pytest
 from kincheck import KincheckError, Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.errors import CaseError
 from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.hardpoints.saving import free_name, save_table
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+
+from ...support.written_again import written_again
 
 POINTS = {
     "uca_front": (90.25, 260.0, 285.0),
@@ -127,3 +132,16 @@ def test_save_over_a_file_is_refused(tmp_path):
     table = read_hardpoints(file)
     with pytest.raises(KincheckError, match="the file exists and stays"):
         save_table(table, Supplied(), moved(table), "car.csv")
+
+
+@pytest.mark.parametrize("template", TEMPLATES)
+@pytest.mark.parametrize("axle", [None, "steer"])
+def test_hardpoint_table_round_trip(template, axle, tmp_path):
+    file = tmp_path / "car.csv"
+    file.write_text(sample_table(TEMPLATES[template]))
+    try:
+        case = load(file, Supplied(travel="0.02:5", axle=axle))
+    except CaseError as error:
+        assert axle is not None
+        pytest.skip(f"no such axle: {error}")
+    written_again(case, tmp_path)

@@ -158,6 +158,13 @@ def test_motion_without_machine_code(capsys):
     assert "no case 'nosuch'" in capsys.readouterr().err
 
 
+def test_forces_beside_motion(capsys):
+    assert main("bench forces --case andrews_squeezer --rounds 1 --json -".split()) == 0
+    found = json.loads(capsys.readouterr().out)["us_per_sample"]["andrews_squeezer"]
+    assert [*found] == ["motion", "forces", "forces, read"]
+    assert all(each["least"] > 0.0 for each in found.values())
+
+
 def test_cost_by_size(capsys):
     assert main("bench size --loops 1 2 --rounds 1 --json -".split()) == 0
     found = json.loads(capsys.readouterr().out)["mechanisms"]

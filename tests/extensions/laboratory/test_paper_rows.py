@@ -7,8 +7,9 @@ that is what keeps Newton off the spurious zeros (formulation section 3).
 import numpy as np
 import pytest
 from kincheck.core import Body, Mechanism, OrientationLock, SolveError
-from kincheck.core.algebra import ZERO, Quat, Vec3, X, turned_by
+from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, turned_by
 from kincheck.core.extensions.laboratory.paper.rows import (
+    LockTest,
     PaperDot11,
     PaperDot12,
     PaperDot20,
@@ -19,7 +20,7 @@ from kincheck.core.extensions.laboratory.paper.rows import (
 from kincheck.core.kinematics import formulate, styles
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.primitives import Dot11, Dot12, NamedTurn
-from kincheck.core.primitives.base import Pose
+from kincheck.core.primitives.base import GROUND_POSE, Pose
 
 from ...support.specimens import (
     LANES,
@@ -190,3 +191,15 @@ def test_newton_branch_from_random_starts(style, rng):
         assert (np.minimum(np.abs(turns - 120.0), np.abs(turns - 180.0)) < 1e-3).all()
     else:
         assert right == STARTS
+
+
+SPURIOUS = [rotation(axis, np.pi) for axis in (X, Y, Z)] + [
+    rotation((1.0 / np.sqrt(3.0)) * Vec3(a, b, c), 2.0 * np.pi / 3.0)
+    for a, b, c in ((1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))
+]
+
+
+@pytest.mark.parametrize("style", [PaperDot12(), LockTest(Y, Z)], ids=["paper", "lock"])
+def test_branch_of_spurious_zeros(style):
+    assert all(style.branch(GROUND_POSE, Pose.of(ZERO, turn))[0] < 0.0 for turn in SPURIOUS)
+    assert style.branch(GROUND_POSE, Pose.of(ZERO, rotation(X, 0.5)))[0] > 0.0

@@ -11,7 +11,9 @@ from kincheck.adapters import engine
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.caches import clear_caches
+from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.case_file import case_text, load_case
+from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.errors import KincheckError, SolveError
 from kincheck.core.extensions.laboratory.stress.families import FAMILIES, Family, Specimen
 from kincheck.core.extensions.laboratory.stress.families.base import as_case
@@ -39,10 +41,11 @@ from kincheck.core.harness.execution import Answer, Failure, Pair
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
 from kincheck.core.joints.base import AxialJoint, unit
+from kincheck.core.mechanism.mechanism import Mechanism
 
-from ...support.by_night import sparse_by_day
 from ...support.engine_faults import changed
 from ...support.fakes import Fake, native_but, raising
+from ...support.loaded_slider_crank import GRAVITY, loaded
 
 NATIVE = engine("native")
 # Of a family whose specimens are of one kind, few show it.
@@ -50,6 +53,7 @@ FEWER = {"loops": 3, "folds": 3}
 STRESS_FILES = sorted((Path(__file__).parents[2] / "data" / "stress").glob("*.toml"))
 
 
+@pytest.mark.nightly
 def test_stress_corner_beside_small_loop():
     """A corner that is turned round between two samples; stepped over where one sigma is asked for
     all blocks of the rows.
@@ -65,7 +69,8 @@ def test_stress_corner_beside_small_loop():
     assert found.counts[Verdict.RIGHT] == samples
 
 
-@pytest.mark.parametrize("name", sparse_by_day(FAMILIES, 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("name", FAMILIES)
 def test_stress_specimens_repeat_and_save(name, tmp_path):
     """The same numbers for the same seed, every kind of each family among them; a case file says
     all of them.
@@ -147,6 +152,7 @@ def test_numpy_solver_in_singular_family():
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("file", [*STRESS_FILES], ids=lambda file: file.stem)
 def test_former_silent_errors_stay_fixed(file):
     """The smallest mechanisms found so far, a sample each."""
@@ -176,6 +182,7 @@ def test_failed_proofs_are_counted(monkeypatch):
     assert "singular at the design" in proofs.reasons[0]
 
 
+@pytest.mark.nightly
 def test_starts_family_finds_rounded_starts(monkeypatch):
     """A tolerance of zero is the old rule: rounded and typed motions then start elsewhere."""
     made = specimens(FAMILIES["starts"], 1, 80)  # once, with their references
@@ -476,3 +483,24 @@ def test_reduced_case_keeps_relevant_parts():
         ("crank_pin", (1.0, 0.0, 0.0))
     ]
     assert [each.name for each in found.outputs] == ["crank_pin_y"]
+
+
+def case_of(mechanism: Mechanism) -> Case:
+    sweep = Sweep(mechanism.drivers[0].name, np.linspace(0.0, 0.25, 3))
+    return with_all_coordinates(
+        Case(mechanism.name, "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+    )
+
+
+def test_reduction_drops_loads_of_removed_parts():
+    """The two forces on the slider go; the others keep a case as it is."""
+    case = case_of(loaded())
+
+    def still(smaller):
+        return any(each.name == "clock" for each in smaller.mechanism.forces)
+
+    small, _ = reduce_case(case, still)
+    assert [each.name for each in small.mechanism.forces] == ["clock"]
+    assert [each.name for each in small.mechanism.moving] == ["crank"]
+    assert small.mechanism.body("crank").mass == 2.0
+    assert small.mechanism.gravity == GRAVITY

@@ -70,6 +70,7 @@ def test_truth_jacobian_and_curvature_equal_differences(name):
     assert np.abs(rows.beyond(at, rates) - second)[others].max() < 1e-6
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("name", PROBES)
 def test_truth_of_joint_types_equals_native(name):
     """That one is held to the paper's equations elsewhere; here it is the other way round: the same
@@ -92,6 +93,7 @@ def test_truth_curve_rates_and_accelerations(name):
         np.testing.assert_allclose(a.astype(float), found.points[point].acceleration, atol=1e-11)
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     "name",
     [

@@ -11,7 +11,6 @@ from kincheck import live as kincheck_live
 from kincheck.core.extensions.live.protocol import LARGEST_MESSAGE
 from websockets.exceptions import ConnectionClosed
 
-from ...support.by_night import sparse_by_day
 from .conftest import TRAVEL, Page, page_of
 
 COUNT = 130
@@ -110,7 +109,8 @@ class Maker:
         )
 
 
-@pytest.mark.parametrize("seed", sparse_by_day(range(6), 6))
+@pytest.mark.by_day(6)
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("kind", ["table", "model"])
 def test_fuzzed_messages_end_no_server(car, kind, seed, caplog):
     server = (

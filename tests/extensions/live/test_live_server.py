@@ -474,6 +474,7 @@ def test_unservable_model_has_status_2(words, car):
     assert "Traceback" not in errors
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("axle", ["heave", "roll", "steer"])
 def test_axle_answer_equals_run(car, axle):
     """Derivatives by travel with the steering held too."""
@@ -489,6 +490,7 @@ def test_axle_answer_equals_run(car, axle):
     assert {*soon} == {*outputs}
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("axle", "travel", "whole"),
     [("roll", "0.06:161", True), ("steer", "0.04:161", True), ("steer", "0.06:161", False)],

@@ -5,11 +5,15 @@ grid, judged as the reference of a case file is.
 import math
 from dataclasses import replace
 
+import kincheck
+import kincheck.adapters
+import kincheck.core
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
 from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
@@ -233,3 +237,21 @@ def test_remark_in_case_reference_is_refused(tmp_path):
     table = read_table(file, None, "--sheet")
     assert samples_of(table, remarks=True).left_out == ["line 3 (sensor changed)"]
     refused(lambda: samples_of(table), "line 3")
+
+
+def test_run_against_measured_curve(tmp_path):
+    """That of the case itself, rounded."""
+    table, curve = tmp_path / "car.csv", tmp_path / "rig.csv"
+    table.write_text(sample_table(TEMPLATES["mcpherson"]))
+    case = kincheck.load(table, kincheck.Supplied(travel="0.05:11"))
+    (record,) = kincheck.run(case, "native").records
+    toe = record.outputs["toe"].position
+    rows = zip(case.sweep.values, toe, strict=True)
+    lines = [f"{1e3 * x:.0f},{math.degrees(y):.3f}" for x, y in rows]
+    curve.write_text("\n".join(["travel [mm],toe [deg]", *lines]) + "\n")
+    results = kincheck.run(case, "native", reference=curve)
+    assert results.records[0].outcome == "pass"
+    with pytest.raises(kincheck.KincheckError, match="found 2 cases"):
+        kincheck.run([case, "rssr"], "native", reference=curve)
+    kincheck.report(results, tmp_path / "report.html")
+    assert "toe" in (tmp_path / "report.html").read_text()

@@ -103,6 +103,7 @@ def workflow(repository):
     return yaml.safe_load((repository / ".github/workflows/kincheck.yml").read_text())
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not shutil.which("jq"), reason="jq, which gh has built in, is not installed")
 def test_workflow_comments_on_pull_requests(repository, runner):
     assert init("--case", "[fs]*.toml") == 0

@@ -122,6 +122,7 @@ CASES = [
 ]
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", CASES)
 def test_force_enclosure_of_library_cases(name):
     case = cases.load(name)

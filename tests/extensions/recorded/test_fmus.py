@@ -147,6 +147,7 @@ def judged(last_record, tmp_path, binary):
 MODEL, STEPS = "ModelExchange", "CoSimulation"
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("kind", [MODEL, STEPS])
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_fmu_outputs_belong_to_their_sample(judged, fmi, kind):

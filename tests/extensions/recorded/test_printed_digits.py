@@ -8,8 +8,6 @@ import json
 import numpy as np
 import pytest
 
-from ...support.by_night import sparse_by_day
-
 A, B, C, D = (np.array(x) for x in ((0, 0), (0.1, 0), (0.26875, 0.24803918541230535), (0.3, 0)))
 P = np.array([0.2, 0.1])
 CASE = f"""schema = "kincheck-case/1"
@@ -117,14 +115,16 @@ def recorded(last_record, tmp_path):
 
 
 @pytest.mark.parametrize("grid", GRIDS)
-@pytest.mark.parametrize("form", sparse_by_day(FORMS, 2))
+@pytest.mark.by_day(2)
+@pytest.mark.parametrize("form", FORMS)
 def test_digits_of_true_recording_pass(recorded, form, grid):
     turn = GRIDS[grid]
     status, record = recorded(text_of(FORMS[form](), turn, *closed_form(turn)))
     assert status == 0, record["message"]
 
 
-@pytest.mark.parametrize("form", sparse_by_day(FORMS, 5))
+@pytest.mark.by_day(5)
+@pytest.mark.parametrize("form", FORMS)
 def test_digits_of_wrong_recording_fail(recorded, form):
     turn = GRIDS["even"]
     assert recorded(text_of(FORMS[form](), turn, *closed_form(turn, longer=1.01)))[0] == 1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kincheck.adapters import engine
 
-from ...adams_decks import BODY, DECKS, mechanism_of, results
+from ..adams.decks import BODY, DECKS, mechanism_of, results
 
 DATA = Path(__file__).parents[2] / "data" / "recordings"
 NATIVE = engine("native")
@@ -19,7 +19,7 @@ POSE = (
     " acceleration ax ay az, alpha bx by bz, frame "
 )
 REACTIONS = [f"JOINT_1.{each}" for each in ("FX", "FY", "FZ", "TX", "TY", "TZ")]
-# Measured of ADAMS' integrator, see tests/adams_decks.py; of the rates of one body alone.
+# Measured of ADAMS' integrator, see decks.py of adams; of the rates of one body alone.
 ACCURACY = ["--accuracy", "velocity=4e-5", "--accuracy", "acceleration=4e-4"]
 
 

@@ -14,7 +14,6 @@ import pytest
 from kincheck.adapters import engine
 from scipy.io import savemat
 
-from ...support.by_night import sparse_by_day
 from ...support.case_texts import write
 
 DATA = Path(__file__).parents[2] / "data" / "recordings"
@@ -150,6 +149,7 @@ def written_as(file, form, crank, rocker):
     return ["--map", f"MOTION_1={names[0]} [rad]", "--map", f"JOINT_4.angle={names[1]} [rad]"]
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("form", "suffix"),
     [
@@ -237,7 +237,8 @@ PLACES = [
 ]
 
 
-@pytest.mark.parametrize("place", sparse_by_day(PLACES, 4))
+@pytest.mark.by_day(4)
+@pytest.mark.parametrize("place", PLACES)
 def test_wrong_number_in_poses_is_located(judged, table, place):
     name, attitude, column = place
     sample = 7 * column % 25
@@ -253,6 +254,7 @@ def test_wrong_number_in_poses_is_located(judged, table, place):
     assert "24 of 25 samples" in record["message"]
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("number", "text"),
     [
@@ -316,6 +318,7 @@ def from_zero(rows):
     return [rows[0], *([f"{float(row[0]) - 50:.4f}", *row[1:]] for row in rows[1:])]
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("options", "change", "text"),
     [
@@ -495,8 +498,9 @@ def coupled(last_record, tmp_path):
     return run
 
 
+@pytest.mark.by_day(5)
 @pytest.mark.parametrize(
-    "given", sparse_by_day(product(["gears", "rack"], [0, 20, 45], ["by column", "by poses"]), 5)
+    "given", [*product(["gears", "rack"], [0, 20, 45], ["by column", "by poses"])]
 )
 def test_recorded_couplers_pass_after_turns(coupled, given):
     kind, first, driven = given

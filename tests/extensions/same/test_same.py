@@ -15,11 +15,10 @@ from kincheck.core.extensions.exports.model_writer import written
 from kincheck.core.extensions.same.undriven import undriven_case, undriven_file
 from kincheck.core.extensions.same.verdict import compare
 
-from ... import converters
-from ...support.by_night import sparse_by_day
 from ...support.case_texts import write
 from ...support.model_files import driven
 from ...support.written_mechanisms import CASES, case
+from . import converters
 
 LIMIT = '<limit lower="-0.2" upper="0.8" effort="5" velocity="2"/>'
 MIMIC = '<mimic joint="left" multiplier="-1" offset="0.02"/>'
@@ -71,6 +70,7 @@ SAME = {
 }
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(("text", "lost"), SAME.values(), ids=SAME)
 def test_same_motion_names_lost_facts(text, lost, tmp_path):
     found = against(tmp_path, text)
@@ -148,7 +148,8 @@ def wedges():
     "name",
     ["four_bar", "five_bar", "hooke_joint_cross", "mcpherson_arm", "strut_swapped", "wedges"],
 )
-@pytest.mark.parametrize("form", sparse_by_day(["mjcf", "urdf", "sdf", "osim"], 2))
+@pytest.mark.by_day(4)
+@pytest.mark.parametrize("form", ["mjcf", "urdf", "sdf", "osim"])
 def test_exported_case_is_same_mechanism(name, form, tmp_path):
     own = {"strut_swapped": lambda: CASES[name], "wedges": wedges}
     given = own.get(name, lambda: cases.load(name))()

@@ -16,7 +16,6 @@ import pytest
 from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
 
-from ...support.by_night import sparse_by_day
 from ...support.cut_models import FORMATS, LAWS, random_closed, written
 
 if importlib.util.find_spec("pxr") is None:
@@ -81,8 +80,10 @@ def test_moved_joint_differs_in_all_formats(form, tmp_path):
     assert compare(undriven_file(one), undriven_file(other), {}).verdict == "differs"
 
 
-@pytest.mark.parametrize("law", sparse_by_day(LAWS, 2))
-@pytest.mark.parametrize("form", sparse_by_day(FORMATS, 2))
+@pytest.mark.by_day(4)
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.by_day(4)
+@pytest.mark.parametrize("form", FORMATS)
 def test_changed_law_is_listed(form, law, tmp_path):
     """A fact of one joint is three times as large."""
     robot = random_closed(2, LAWS)

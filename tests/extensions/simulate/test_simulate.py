@@ -25,6 +25,7 @@ from kincheck.core.harness.run import run
 from kincheck.core.mechanism.motions import Sine
 
 from ...support.engine_motion import installed, mechanism_of, motion_case
+from ...support.loaded_slider_crank import pushed
 from ...support.mechanisms import ORIGIN, X, Y, Z, mcpherson
 
 
@@ -366,3 +367,9 @@ def test_command_line_separates_modes(tmp_path, capsys):
     )
     assert main.main(["list"]) == 0
     assert "exudyn-static-modified" in capsys.readouterr().out
+
+
+def test_equivalent_joint_bodies_are_massless():
+    added = {each.name: each.mass for each in with_joints_alone(pushed()).bodies}
+    assert len(added) == 3 + 4  # of a rod, and three slides
+    assert sum(added.values()) == 5.5

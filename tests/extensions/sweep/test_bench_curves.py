@@ -8,14 +8,19 @@ from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_tabl
 
 
 def test_bench_of_curves_tells_ratio(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("kincheck.core.extensions.laboratory.bench.curves.DESIGNS", 8)
+    for name, number in (("DESIGNS", 8), ("PROCESSES", 1)):
+        monkeypatch.setattr(f"kincheck.core.extensions.laboratory.bench.curves.{name}", number)
     file = tmp_path / "car.csv"
     file.write_text(sample_table(TEMPLATES["semi_trailing_arm"]))
-    assert main(f"bench curves {file} --rounds 1 --json -".split()) == 0
-    found = json.loads(capsys.readouterr().out)
+    assert main(f"bench curves {file} --rounds 1 --json {file}.json".split()) == 0
+    assert capsys.readouterr().out.count("goal: at most") == 6
+    found = json.loads((tmp_path / "car.csv.json").read_text())
     assert (found["designs"], found["samples"], found["places"]) == (8, 41, 18)
     own, alone = (found[f"us_per_sample_of_{each}"]["least"] for each in ("outputs", "points"))
     assert found["ratio"] == pytest.approx(own / alone)
+    for each in ("motion", "outputs", "new_numbers"):
+        assert found[f"s_of_first_{each}"]["least"] > 0.0
+    assert found["ms_of_live"]["least"] > 0.0
 
 
 def test_bench_without_table_is_refused(capsys):

@@ -60,6 +60,7 @@ def test_cluster_sweep_survives_lost_worker(cluster, tmp_path):
     assert timeless(there) == timeless(sweep_designs(case, variation, **common))
 
 
+@pytest.mark.nightly
 def test_cluster_sweep_survives_frozen_worker(cluster, tmp_path):
     case = crank()
     variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1})

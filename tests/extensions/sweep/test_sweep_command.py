@@ -254,6 +254,7 @@ def numbers(folder):
     return {key: value for key, value in found.items() if key not in ("run", "measured")}
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("chunks", [1, 3])
 def test_resumed_sweep_is_bit_equal(arguments, whole, tmp_path, capsys, stop, chunks):
     (_, whole), out = whole, tmp_path / "out"

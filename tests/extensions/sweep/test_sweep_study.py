@@ -5,6 +5,9 @@ from dataclasses import replace
 from io import StringIO
 from itertools import pairwise
 
+import kincheck
+import kincheck.adapters
+import kincheck.core
 import msgspec
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from kincheck.core.case.case import Output, without_forces
 from kincheck.core.case.measures import Component, JointAngle, JointDisplacement, Orientation
 from kincheck.core.case.quantity import where_moving, with_markers
 from kincheck.core.errors import KincheckError
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.extensions.sweep.statistics import (
     QUANTILES,
     empty_summary,
@@ -29,6 +33,7 @@ from kincheck.core.extensions.sweep.tables import print_sweep, without_gradients
 from kincheck.core.extensions.sweep.variation import DRAWN, Law, Limit
 from kincheck.core.harness.compare import output_series
 from kincheck.core.jet import Jet
+from kincheck.primitives import Dot10
 from scipy import stats
 
 from ...support.fakes import crank, exact, swept
@@ -158,7 +163,7 @@ def test_large_chunks_are_solved_in_parts(tmp_path):
     case = swept(case, np.linspace(-1.0, 1.0, 9001))
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     ready = Ready.of(Study(case, variation, 300, 4))
-    assert 8 < ready.lanes < 64
+    assert 8 < ready.outputs.at_once < 64
     parts, right = ready.chunk(0), cranks(case, variation, 4, 64)
     np.testing.assert_allclose(np.concatenate(parts.kept, axis=2), right, rtol=0, atol=1e-14)
     np.testing.assert_allclose(parts.summary.mean, right.mean(axis=2), rtol=0, atol=1e-14)
@@ -566,3 +571,21 @@ def test_impossible_samplings_are_refused(tmp_path):
     grid = vary(tmp_path, crank(), "grid", tip={"at": "tip", "values": [-1, 1]})
     with pytest.raises(KincheckError, match="--sampling latin: grid draws nothing"):
         grid.sampled(Sampling.LATIN, 8)
+
+
+VARY = """schema = "kincheck-vary/1"
+mode = "monte_carlo"
+units = { length = "mm", angle = "deg" }
+hardpoints.lca_front = { at = "lca_front", sigma = 1.0 }
+"""
+
+
+def test_sweep_and_primitives_in_python(tmp_path):
+    table, vary = tmp_path / "car.csv", tmp_path / "vary.toml"
+    table.write_text(sample_table(TEMPLATES["mcpherson"]))
+    vary.write_text(VARY)
+    case = kincheck.load(table, kincheck.Supplied(travel="0.05:3"))
+    results = kincheck.sweep(case, vary, samples=20)
+    assert results.samples == 20
+    assert "toe" in results.to_html()
+    assert kincheck.primitives.Dot10 is Dot10

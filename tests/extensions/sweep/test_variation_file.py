@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import CaseError
+from kincheck.core.cli.lists import schema_of
 from kincheck.core.extensions.sweep.variation import Law
 from kincheck.core.extensions.sweep.variation_file import read_variation
 
+from ...support.case_texts import write
 from ...support.fakes import crank
 from ...support.variations import HEAD, moved, vary
 
@@ -300,3 +302,32 @@ def test_absolute_driver_of_varied_point_refused(tmp_path):
     ):
         vary(tmp_path, absolute, wc={"at": "wheel_center", "sigma": 1.0})
     vary(tmp_path, absolute, ball={"at": "ball", "sigma": 1.0})
+
+
+def test_variation_is_named_with_line(tmp_path):
+    text = 'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.tip]\nsigmma = 1\n'
+    with pytest.raises(CaseError, match=r"vary\.toml: line 4: hardpoints\.tip\.sigmma: "):
+        read_variation(write(tmp_path, text, "vary.toml"), crank())
+
+
+jsonschema = pytest.importorskip("jsonschema")
+
+
+def validator(name):
+    schema = schema_of(name)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+def test_variation_schema():
+    vary = validator("variation")
+    tables = {
+        "schema": "kincheck-vary/1",
+        "mode": "monte_carlo",
+        "units": {"length": "mm"},
+        "hardpoints": {"ball": {"at": "joints.ball.point", "sigma": [0.5, 0.5, 0]}},
+        "lines": {"slide": {"axis": "joints.slide.axis", "through": ["a", "b"]}},
+    }
+    assert [*vary.iter_errors(tables)] == []
+    for wrong in ({"mode": "many"}, {"hardpoints": {"ball": {"sigma": 0.5}}}, {"lines": {"a": {}}}):
+        assert [*vary.iter_errors(tables | wrong)]

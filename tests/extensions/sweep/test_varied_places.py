@@ -21,7 +21,6 @@ from kincheck.core.extensions.sweep.variation_file import read_variation
 from kincheck.core.extensions.sweep.varied_places import Geometry
 from kincheck.core.kinematics import placed
 
-from ...support.by_night import sparse_by_day
 from ...support.rods_of_templates import solved
 from ...support.variations import moved, vary, vary_file
 
@@ -89,7 +88,8 @@ CASES = {
 } | {"mcpherson right": ("mcpherson", RIGHT, CORNER)}
 
 
-@pytest.mark.parametrize("key", sparse_by_day(CASES, 5))
+@pytest.mark.by_day(9)
+@pytest.mark.parametrize("key", CASES)
 def test_variant_of_row_equals_moved_table(tmp_path, key):
     """Every row of every template, moved by a millimetre and more along the axes of the table."""
     name, rows, supplied = CASES[key]
@@ -147,7 +147,8 @@ def compared(ready):
     assert not known
 
 
-@pytest.mark.parametrize("key", sparse_by_day(CASES, 5, 1))
+@pytest.mark.by_day(9)
+@pytest.mark.parametrize("key", CASES)
 def test_explain_of_table_equals_gradients(tmp_path, key):
     name, rows, supplied = CASES[key]
     case = case_of(table(tmp_path, name, rows), supplied)
@@ -157,7 +158,8 @@ def test_explain_of_table_equals_gradients(tmp_path, key):
 SUSPENSIONS = [name for name in cases.names() if name.startswith(("mcpherson", "chrono"))]
 
 
-@pytest.mark.parametrize("name", sparse_by_day(SUSPENSIONS, 3))
+@pytest.mark.by_day(6)
+@pytest.mark.parametrize("name", SUSPENSIONS)
 def test_explain_of_suspension_equals_gradients(tmp_path, name):
     """Positions at one point move together in both, with the markers of the wheel."""
     case = cases.load(name)

@@ -14,7 +14,6 @@ from kincheck.core.extensions.trace.curve import trace
 
 from ...kinematics.test_redundancy import locomotive
 from ...kinematics.test_singular import LIMITS
-from ...support.by_night import sparse_by_day
 from ...support.mechanisms import (
     A0,
     B0,
@@ -202,6 +201,7 @@ COARSE = 0.25
 """Longest step of closed curves: the coarser the walk, the harder are its ends."""
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("centre", "direction", "past"),
     [
@@ -263,7 +263,8 @@ def test_rocker_curve_finds_dead_centres(past, direction):
     assert found == pytest.approx(expected, abs=1e-11)
 
 
-@pytest.mark.parametrize("past", sparse_by_day([-0.004, 0.03, 0.004, -0.03], 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("past", [-0.004, 0.03, 0.004, -0.03])
 def test_branch_point_beside_closed_start(past):
     """All cranks in line, a little before or behind: once each way round, and the other one half a
     turn away.
@@ -280,7 +281,8 @@ def test_branch_point_beside_closed_start(past):
     assert {event.kind for event in curve.events} == {"branch point"}
 
 
-@pytest.mark.parametrize("past", sparse_by_day([-0.001, -0.004, 0.001, 0.004], 3))
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("past", [-0.001, -0.004, 0.001, 0.004])
 def test_branch_point_beside_open_start(past):
     """Seen by one of both directions."""
     curves = [

@@ -62,6 +62,7 @@ EQUALITIES = {
 }
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("kind", EQUALITIES)
 def test_equality_closes_as_in_mujoco(tmp_path, kind):
     """Each closes what it says: driven joints and residuals in MuJoCo."""

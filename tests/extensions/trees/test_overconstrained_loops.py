@@ -20,7 +20,6 @@ from kincheck.core.extensions.closing.reduction import reduce_rows
 from kincheck.core.kinematics import NativeSolver, largest_residual
 from scipy.spatial.transform import Rotation
 
-from ...support.by_night import sparse_by_day
 from ...support.cut_models import CHAINS, closed_chain, written
 from ...support.overconstrained_loops import FAMILIES, random_loop
 
@@ -81,13 +80,15 @@ def require_motion_of_least_squares(form, family, digits, folder, seed):
     assert largest_residual(case.mechanism, joints, bodies) <= tolerance
 
 
-@pytest.mark.parametrize("family", sparse_by_day(FAMILIES, 2))
+@pytest.mark.by_day(2)
+@pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("digits", [4, 12])
 def test_few_digits_move_like_least_squares(family, digits, tmp_path):
     for seed in SEEDS:
         require_motion_of_least_squares("case", family, digits, tmp_path, seed)
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("form", [form for form in CHAINS if form != "case"])
 def test_few_digits_in_formats(form, tmp_path):
     for family, digits in (("factorized", 5), ("plane", 6), ("bennett", 6)):
@@ -115,6 +116,7 @@ def test_six_hinges_in_second_engine(family, tmp_path):
     assert np.abs(tips[0] - tips[1]).max() < tolerance
 
 
+@pytest.mark.by_day(3)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_kept_rows_hold_in_whole_joint(family, tmp_path):
     """What stays of a hinge is true of the exact linkage at any pose, and not only at the start."""

@@ -2,8 +2,8 @@
 
 import pytest
 
-from ...fuzz import mjcf
 from ...support.model_poses import EXACT
+from .fuzz import mjcf
 
 pytest.importorskip("mujoco")
 public_robots = pytest.importorskip("tests.oracles.public_robots")

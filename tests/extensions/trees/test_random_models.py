@@ -79,6 +79,7 @@ def random_case(kind, seed, folder):
         raise
 
 
+@pytest.mark.by_day(2)
 @pytest.mark.parametrize("kind", FORMATS)
 def test_random_model_round_trip(kind, tmp_path):
     found = [random_case(kind, seed, tmp_path) for seed in range(1, MODELS + 1)]

@@ -12,10 +12,10 @@ from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
 from kincheck.core.extensions.trees.reader import read_tree
 
-from ...fuzz import sdf as seeds
 from ...support.case_texts import complains, refused, write
 from ...support.model_files import driven, edited
 from ...support.model_poses import EXACT, coordinate, near, solution
+from .fuzz import sdf as seeds
 
 DRIVE = driven("A:0:0.5:5")
 FOUR_BAR = seeds.FOUR_BAR.decode()

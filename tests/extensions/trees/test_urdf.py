@@ -17,11 +17,11 @@ from kincheck.core.joints import Polynomial, Revolute
 from kincheck.core.mechanism.mechanism import Body, Mechanism
 from kincheck.core.mechanism.motions import JointAngle
 
-from ...fuzz import urdf as seeds
 from ...support.case_texts import write
 from ...support.model_files import driven, edited
 from ...support.model_poses import EXACT, coordinate, near, solution
 from ...support.urdf_texts import DRIVE, FOUR_BAR, TREE, robot
+from .fuzz import urdf as seeds
 
 ENDS = '<parent link="b"/><parent_origin xyz="4 0 0"/><child link="c"/>'
 THERE = 'xyz="-0.958851077208406 0 1.7551651237807455"'

@@ -155,3 +155,28 @@ def test_closing_frames_tied_already(tmp_path):
     text = FIVE_BAR.replace("</robot>", f"{loop}{ends}</robot>")
     tree = read_tree(robot(tmp_path, text))
     assert [each.name for each in tree.ties] == ["C"]
+
+
+FAULTS_FAULTS_BESIDE = {
+    "robot.yaml": "closed_loop: [[a, b],\n [a, zq]]\ntype: [3d, 3d] | line 2: closed_loop[1]",
+    "robot.yml": "pin_loops:\n- {parent: a}\n | line 2: pin_loops[0]: Object missing",
+    "robot.constraints.json": (
+        '{"schema": "kincheck-constraints/1",\n"constraints": [],\n"bodes": {}}'
+        " | line 3: bodes: unknown key, expected one of ... did you mean 'bodies'?"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS_FAULTS_BESIDE)
+def test_file_beside_robot_has_line(tmp_path, name):
+    if not name.endswith("json"):
+        pytest.importorskip("yaml")
+    text, _, said = FAULTS_FAULTS_BESIDE[name].partition(" | ")
+    robot = (
+        "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='continuous'>"
+        "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>"
+    )
+    write(tmp_path, text, name)
+    with pytest.raises(CaseError) as found:
+        load(write(tmp_path, robot, "robot.urdf"), driven("j:0:1:3"))
+    assert all(part in str(found.value) for part in (name, *said.split(" ... ")))

@@ -17,7 +17,8 @@ import numpy as np
 from ....case.case import Case, size
 from ....harness.compare import output_series
 from ....joints import Kind
-from ....kinematics import NativeSolver, kinds, places
+from ....kinematics import NativeSolver, ProgramSize, kinds, places
+from ....program import ITERATIONS
 from ....program.executor import compiler
 from ....trajectory import PointMotion, Trajectory
 from ...designs.design_batch import Variants
@@ -80,9 +81,10 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
     for count, solve in batches.items():
         found, n = solve(), len(case.sweep.values)
         reached = int(found.solved.sum())
-        taken: list[float] = designs.iterations(found)[found.solved].tolist()
+        model = designs.route.model
+        taken: list[float] = found.kept[model.rows[ITERATIONS].start][found.solved].tolist()
         iterations = statistics.fmean(taken) if taken else 0.0
-        flops = designs.size.of_sample(iterations, motions=True)
+        flops = ProgramSize.of(model).of_sample(iterations, motions=True)
         rate = flops * reached / seconds[count].median
         rows.append(
             Batch(

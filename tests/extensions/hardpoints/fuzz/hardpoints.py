@@ -14,9 +14,9 @@ from kincheck.core.extensions.hardpoints.read import case_of_hardpoints
 from kincheck.core.extensions.hardpoints.rows import read_rows
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
-from .fuzzing import FOLDER, changing, read_or_refused, written
-from .keeping import seeds_in_file
-from .trees import changed_json, changed_lines
+from ....fuzz.fuzzing import FOLDER, changing, read_or_refused, written
+from ....fuzz.keeping import seeds_in_file
+from ....fuzz.trees import changed_json, changed_lines
 
 LONGEST = 8000
 ROLES = [

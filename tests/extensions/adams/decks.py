@@ -1,4 +1,6 @@
-"""Decks of Project Chrono against the results of ADAMS beside them: python -m tests.adams_decks
+"""Decks of Project Chrono against the results of ADAMS beside them:
+
+    python -m tests.extensions.adams.decks
 
 Each recorded sample is judged as it stands: rows of the deck's joint at the recorded pose, velocity
 and acceleration, the reaction of the joint, and the force that nothing holds. (d): over what the
@@ -19,9 +21,9 @@ from kincheck.core.extensions.residuals.replay import needed_forces
 from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation
 
-from .oracles import naive
+from ...oracles import naive
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[2] / "data"
 DECKS = {
     file.stem.removeprefix("test_").replace("TransSpring", "TranSpring"): file
     for file in sorted((DATA / "adams").glob("test_*.adm"))

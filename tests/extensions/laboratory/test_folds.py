@@ -20,7 +20,7 @@ from kincheck.core.extensions.laboratory.truth.motion import Reach, follow_motio
 from kincheck.core.harness.execution import Pair
 from kincheck.core.kinematics import continuous, is_continuation, regular_between
 
-from ..support.engine_motion import SIMULATORS, installed, rotation
+from ...support.engine_motion import SIMULATORS, installed, rotation
 
 BEYOND = Path(__file__).parents[1] / "data" / "beyond_a_fold.toml"
 

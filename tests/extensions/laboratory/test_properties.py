@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from kincheck import adapters
@@ -20,7 +21,7 @@ from kincheck.core.extensions.laboratory.stress.verdicts import with_numpy_execu
 from kincheck.core.mechanism.motions import Sine
 from scipy.spatial.transform import Rotation
 
-from ..support import mechanisms
+from ...support import mechanisms
 
 ENGINE = with_numpy_executor(adapters.engine("native"))
 LOOPS, LARGEST, SAMPLES = 8, 5, 5
@@ -124,6 +125,7 @@ def for_random_loops(test):
     return run(given(seed=st.integers(0, LOOPS - 1))(on_loop))
 
 
+@pytest.mark.nightly
 @for_random_loops
 def test_random_loop_moved_rigidly(rng, case, expected, allowed):
     turn, shift = Rotation.random(random_state=rng), rng.normal(size=3)

@@ -13,8 +13,8 @@ from kincheck.core.extensions.trees.urdf import (
     TYPES,
 )
 
-from .fuzzing import FOLDER, changing, reading, written
-from .trees import changed_xml
+from ....fuzz.fuzzing import FOLDER, changing, reading, written
+from ....fuzz.trees import changed_xml
 
 LONGEST = 4200
 BESIDE = {

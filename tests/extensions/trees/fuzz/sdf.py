@@ -3,8 +3,8 @@
 from kincheck.core.extensions.trees.robot_elements import STRUT
 from kincheck.core.extensions.trees.sdf import IN_AXIS, IN_JOINT, IN_LINK, IN_MODEL, TYPES
 
-from .fuzzing import changing, reading
-from .trees import changed_xml
+from ....fuzz.fuzzing import changing, reading
+from ....fuzz.trees import changed_xml
 
 LONGEST = 4200
 WORDS = (

@@ -16,9 +16,9 @@ from kincheck.core.extensions.recorded.engine import RecordedEngine
 from kincheck.core.extensions.recorded.fmu import read_fmu
 from kincheck.core.extensions.recorded.source import recorded_engines
 
-from .fuzzing import changing, read_or_refused, written
-from .keeping import seeds_in_file
-from .trees import changed_lines, changed_xml
+from ....fuzz.fuzzing import changing, read_or_refused, written
+from ....fuzz.keeping import seeds_in_file
+from ....fuzz.trees import changed_lines, changed_xml
 
 LONGEST = 6000
 MAP = re.compile(r"^# map (.*)$", re.MULTILINE)

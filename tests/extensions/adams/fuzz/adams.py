@@ -7,11 +7,11 @@ from pathlib import Path
 from kincheck.core.case.models.files import load
 from kincheck.core.extensions.adams.dataset import ARGUMENTS, KNOWN
 
-from .fuzzing import changing, read_or_refused, said, written
-from .trees import changed_text
+from ....fuzz.fuzzing import changing, read_or_refused, said, written
+from ....fuzz.trees import changed_text
 
 LONGEST = 6000
-DATA = Path(__file__).parent.parent / "data"
+DATA = Path(__file__).parents[3] / "data"
 SIGNS = """TIME SIN COS SQRT STEP POLY SHF DM VR AZ WZ PI RTOD USER IF ( ) , ! & ; \\ = ** 90D 1E3
 MILLIMETER INCH SECOND POUND_MASS NEWTON MKS NONE R:T hold rest recorded without END"""
 WORDS = (*KNOWN, *(name for each in ARGUMENTS.values() for name in each.split()), *SIGNS.split())

@@ -2,9 +2,9 @@
 
 from kincheck.core.extensions.usd.usd import GENERIC, IN_BODY, IN_JOINT, ROD, TYPES
 
-from .fuzzing import changing, reading
-from .keeping import seeds_in_file
-from .trees import changed_text
+from ....fuzz.fuzzing import changing, reading
+from ....fuzz.keeping import seeds_in_file
+from ....fuzz.trees import changed_text
 
 LONGEST = 6000
 WORDS = (

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from kincheck.core.extensions.trees.mjcf_language import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, ROOT
 
-from .fuzzing import changing, reading
-from .trees import changed_xml
+from ....fuzz.fuzzing import changing, reading
+from ....fuzz.trees import changed_xml
 
 LONGEST = 4200
 SAYS = """angle eulerseq degree radian local hinge slide ball free default childclass mocap fixed
@@ -60,7 +60,7 @@ one = reading("model.xml")
 
 def seeds() -> list[bytes]:
     """A gripper, a linkage, sliders, a rod, copies on curves from a keyframe, and springs."""
-    gripper = (Path(__file__).parent.parent / "data" / "mjcf" / "robotiq_2f85.xml").read_bytes()
+    gripper = (Path(__file__).parents[3] / "data" / "mjcf" / "robotiq_2f85.xml").read_bytes()
     springs = b"right_driver_joint:0:0.8:17 hold right_spring_link_joint left_spring_link_joint "
     return [
         FOUR_BAR,

@@ -1,4 +1,6 @@
-"""What simulators lose of models that they load and save: python -m tests.converters FILE ...
+"""What simulators lose of models that they load and save:
+
+    python -m tests.extensions.same.converters FILE ...
 
 Prints a row of a table for each file: the verdict of `kincheck same FILE --converted-by mujoco`.
 """

@@ -3,9 +3,9 @@
 from kincheck.core.extensions.osim.curves import FUNCTIONS
 from kincheck.core.extensions.osim.osim import AXES, CHAINS, CONSTRAINTS
 
-from .fuzzing import changing, reading
-from .keeping import seeds_in_file
-from .trees import changed_xml
+from ....fuzz.fuzzing import changing, reading
+from ....fuzz.keeping import seeds_in_file
+from ....fuzz.trees import changed_xml
 
 LONGEST = 6000
 IN_FILES = """socket_parent_frame socket_child_frame coordinates frames components SpatialTransform
