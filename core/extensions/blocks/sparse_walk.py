@@ -362,7 +362,9 @@ class SparseWalk:
         tested = *TESTED.split(), *of_turns
 
         def test(*values: Scalar) -> Sequence[Scalar]:
-            return _test(dict(zip(tested, values, strict=True)).__getitem__, turns)
+            given = dict(zip(tested, values, strict=True))
+            given |= {FROM + each: before(given[each], given[FROM + each]) for each in turns}
+            return _test(given.__getitem__, turns)
 
         tests = {"test": [(test, tested, "block_margin slope orientation")]}
         found = {
