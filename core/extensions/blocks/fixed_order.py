@@ -92,8 +92,8 @@ class FixedOrder:
         return "gather", self._lower, self._upper
 
     def factoring(self, slots: NDArray[np.intp], out: NDArray[np.intp]) -> list[NDArray[np.int64]]:
-        """Return the table of `factor_lanes`, and what it refers to. One matrix that strays is
-        reason to look at all of them: each has the largest growth and inverse of all.
+        """Return the table of `factor_lanes`, and its arrays. One straying matrix is reason to look
+        at all of them: each has the largest growth and inverse of all.
 
         Args:
             slots: of the numbers of a matrix, and of zero.
@@ -106,8 +106,8 @@ class FixedOrder:
     def solving(
         self, given: NDArray[np.intp], found: NDArray[np.intp], *, transposed: bool
     ) -> list[NDArray[Any]]:
-        """Return the table of `solve_lanes`, and what it refers to; the slots of right-hand sides
-        and solutions are in the order of elimination.
+        """Return the table of `solve_lanes`, and its arrays; the slots of right-hand sides and
+        solutions are in the order of elimination.
         """
         name, first, last = self._sweeps(transposed=transposed)
         work, places = aligned(self.n * LANES), [x.astype(np.int64) for x in (given, found)]
@@ -412,7 +412,7 @@ def _in_lanes() -> str:
 
 
 def _of_all(name: str, k: int) -> str:
-    """Return lines that give all lanes the largest of numbers of no sign, or NaN: their bits have
+    """Return lines to give all lanes the largest of numbers without a sign, or NaN: their bits have
     the same order.
     """
     return f"""{_load(f"{name}_here", "%growth", str(k), WORDS)}

@@ -51,7 +51,7 @@ from ...program.numpy_executor import lagrange
 from ...trajectory import Array
 from ..llvm.machine_code import works
 from .elements import LargeSystem
-from .sparse_lu import Blocks, FactorsOfLanes, Pattern, SingularError
+from .sparse_lu import FactorsOfLanes, Rows, SingularError
 from .sparse_walk import FARTHEST, SETTLED, STALLS, Poses, SparseWalk
 from .sweep import CERTAIN, MARGINS, WORST, Indices, Lanes
 
@@ -62,34 +62,6 @@ FEW = 5
 # Steps of inverse iteration: each divides what is left of other directions by the square of how
 # much better they are determined.
 STEPS = 3
-
-
-class Rows:
-    """A choice of the rows to solve.
-
-    Args:
-        kept: the solved ones.
-        entries: of all rows at one pose; several lanes are factored in the order of that pose.
-
-    Attributes:
-        dropped: redundant rows.
-        pattern, blocks: of the solved ones.
-    """
-
-    def __init__(self, kept: Indices, system: System, entries: Array, *, compiled: bool) -> None:
-        count = len(system.tracer.formulation.owners)
-        place = np.full(count, -1, np.intp)
-        place[kept] = np.arange(len(kept))
-        solved = np.flatnonzero(place[system.rows] >= 0)
-        square = place[system.rows[solved]], system.columns[solved], len(kept), solved
-        values = entries if compiled else None
-        self.kept, self.dropped = kept, np.setdiff1d(np.arange(count), kept)
-        self.pattern, self.blocks = Pattern(*square, values), Blocks(*square, values)
-
-    def begin(self) -> None:
-        """Forget the orders of before."""
-        self.pattern.begin()
-        self.blocks.pattern.begin()
 
 
 class Rest(NamedTuple):

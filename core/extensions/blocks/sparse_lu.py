@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...caches import cache_last
+from ...kinematics.compiled.dense_equations import System
 from ...kinematics.structure.degrees_of_freedom import NARROW, Indices
 from ...trajectory import Array
 from ..llvm.machine_code import works
@@ -256,6 +257,34 @@ class Blocks:
         right = factors.solve(left)
         squares = self._sum_rows @ left**2, self._sum_columns @ right**2
         return np.sqrt(np.divide(*squares)), factors.signs(m)
+
+
+class Rows:
+    """A choice of the rows to solve.
+
+    Args:
+        kept: the solved ones.
+        entries: of all rows at one pose; several lanes are factored in the order of that pose.
+
+    Attributes:
+        dropped: redundant rows.
+        pattern, blocks: of the solved ones.
+    """
+
+    def __init__(self, kept: Indices, system: System, entries: Array, *, compiled: bool) -> None:
+        count = len(system.tracer.formulation.owners)
+        place = np.full(count, -1, np.intp)
+        place[kept] = np.arange(len(kept))
+        solved = np.flatnonzero(place[system.rows] >= 0)
+        square = place[system.rows[solved]], system.columns[solved], len(kept), solved
+        values = entries if compiled else None
+        self.kept, self.dropped = kept, np.setdiff1d(np.arange(count), kept)
+        self.pattern, self.blocks = Pattern(*square, values), Blocks(*square, values)
+
+    def begin(self) -> None:
+        """Forget the orders of before."""
+        self.pattern.begin()
+        self.blocks.pattern.begin()
 
 
 @cache_last(64)

@@ -1,8 +1,8 @@
 """The walk of a sparse system by machine code: eight samples are predicted, iterated and tested,
 and the walk goes on from the last of them.
 
-Its programs say the same as `SparseLanes` says with arrays. Where a factor strays, or other rows
-are to be chosen, the walk ends, and arrays decide.
+Its programs test as `SparseLanes` tests with arrays. If a factor strays, or other rows are to be
+chosen, the walk ends, and arrays decide.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import reduce
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,11 +61,8 @@ from ..llvm.jit import LlvmCode
 from ..llvm.plan import address, aligned
 from .elements import AFTER, LargeSystem
 from .fixed_order import LANES, load_loops
-from .sparse_lu import GROWTH
+from .sparse_lu import GROWTH, Rows
 from .sweep import CLOSURES, MARGINS, SIGMAS
-
-if TYPE_CHECKING:
-    from .sparse_lanes import Rows
 
 Indices = NDArray[np.intp]
 # Residuals below this, some round-offs in rows of size one, are as small as they get; elsewhere an
@@ -111,7 +108,7 @@ class Poses:
 
 
 def _joined(x: Scalar, join: Callable[[Scalar, Scalar], Scalar], fall: float = 1.0) -> Scalar:
-    """Return what a lane and all before it are joined to; those fall by a factor a lane."""
+    """Return the join of a lane and all before it, which fall by a factor a lane."""
     for lanes in (1, 2, 4):
         there = reduce(lambda y, _: before(y, y), range(lanes), x)
         x = join(x, fall**lanes * there)
@@ -119,7 +116,7 @@ def _joined(x: Scalar, join: Callable[[Scalar, Scalar], Scalar], fall: float = 1
 
 
 def _strays(growth: Scalar, inverse: Scalar) -> Scalar:
-    """Return one where a factor is not to be believed, else zero."""
+    """Return one for lanes with an unbelievable factor, else zero."""
     return where_larger(GROWTH, growth, where_larger(math.inf, inverse, 0.0, 1.0), 1.0)
 
 
@@ -172,8 +169,8 @@ def _step(step: Scalar, active: Scalar) -> Sequence[Scalar]:
 def _distances(
     x: Scalar, predicted: Scalar, start: Scalar, scale: Scalar, zero: Scalar
 ) -> Sequence[Scalar]:
-    """Return how far a number of the state is from where it was predicted, less the same of the
-    lane before; from there; and from the start.
+    """Return the distances of a number of the state: from its prediction, less the same of the lane
+    before; from the lane before; and from the start.
     """
     off = x - predicted
     return [scale * each for each in (off - before(off, zero), x - before(x, start), x - start)]
@@ -191,8 +188,8 @@ def _sigma(left: Any, right: Scalar, last: Scalar, largest: Scalar, high: Scalar
 
 
 def _test(read: Callable[[str], Scalar], turns: Sequence[str]) -> Sequence[Scalar]:
-    """Return the margin of a lane by the tests of one block, NaN where arrays decide; what is known
-    of the slope of that; and the orientation.
+    """Return the margin of a lane by the tests of one block, NaN if arrays decide; the known slope
+    of the block; and the orientation.
     """
     sigma, last = read("block_sigma"), before(read("block_sigma"), read("from_block_sigma"))
     seen = slope_between(sigma, last, read(MOVED))
@@ -309,7 +306,7 @@ class SparseWalk:
     """A sparse system with its solved rows, ready to walk.
 
     Args:
-        scale: what a change of each number of the state is measured by, shape (numbers, 1).
+        scale: unit of the changes of each number of the state, shape (numbers, 1).
         turns: names of the angles of turning drivers.
         wanted: vectors of the wanted motions.
 

@@ -65,7 +65,7 @@ class Lanes(ABC):
         many: number of lanes.
         worst: the worst tests of all blocks, shape (WORST, room).
         last: the lane of the last time of the last attempt.
-        refused: whether the last walk ended at once, at a sample that no closer look accepts.
+        refused: whether the last walk ended at once, and no closer look accepts its first sample.
     """
 
     mechanism: Mechanism
@@ -90,8 +90,8 @@ class Lanes(ABC):
         return self.attempt_at(self.sample_tables(times, path))
 
     def reach(self, times: Array, path: Path) -> int:
-        """Attempt neighbouring times, up to the number of lanes, and predict from the last that is
-        reached from now on; return how many are.
+        """Attempt neighbouring times, up to the number of lanes; return how many are reached, and
+        predict from the last of them from now on.
         """
         accepted = leading(self.attempt_at(self.sample_tables(times, path), neighbours=True))
         if accepted:
