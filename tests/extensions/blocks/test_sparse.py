@@ -55,10 +55,6 @@ def turning(*values, rate=1.0):
     return Path({"turn": Ramp(rate)}, np.array(values))
 
 
-def compared(mechanism, path, points):
-    assert_alike(*with_one_program(Method.SPARSE, mechanism, path, points))
-
-
 def test_sparse_couplers():
     held = Translational("held", "ground", "nut", (1.0, 0.1, 0.5), Z)
     m = gears()

@@ -20,7 +20,6 @@ from kincheck.core import (
     OrientationLock,
     Point,
     PointCoordinate,
-    Polynomial,
     Revolute,
     Screw,
     Spherical,
@@ -203,16 +202,10 @@ def test_contradiction_of_long_rods_by_length():
     assert Ranks(moved).contradictions == []
 
 
-@pytest.mark.parametrize(
-    "coupler",
-    [
-        Polynomial("k", ("b", "a"), (0.1, 1.0)),
-        Spline("k", ("b", "a"), ((-1.0, -1.0), (1.0, 1.2))),
-    ],
-)
-def test_coupled_joint_begins_elsewhere(coupler):
+def test_coupled_joint_begins_elsewhere():
     hinges = [Revolute(x, "ground", x, X, X) for x in "ab"]
-    coupled = Mechanism("m", [*map(Body, "ab")], hinges, couplers=[coupler])
+    knee = Spline("knee", ("b", "a"), ((-1.0, -1.0), (1.0, 1.2)))
+    coupled = Mechanism("m", [*map(Body, "ab")], hinges, couplers=[knee])
     assert Ranks(coupled).contradictions == []
 
 
