@@ -96,11 +96,9 @@ def steps(name: str, folder: Path, options: argparse.Namespace) -> Iterator[Sequ
     every = {each.name for each in EXTENSIONS}
     if options.alone:
         copy_without(every - {name, *needed(name)}, folder)
-        own = Path("tests/extensions", name)
-        if name == KERNEL:
-            yield *pytest, "--numprocesses", "auto"
-        elif (folder / own).exists():
-            yield *pytest, "--numprocesses", "auto", str(own)
+        own = "tests" if name == KERNEL else f"tests/extensions/{name}"
+        if (folder / own).exists():
+            yield *pytest, "--numprocesses", "auto", own
         return
     copy_without([name], folder)
     yield sys.executable, "-c", WORKS, name, *sorted(every)
