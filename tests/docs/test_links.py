@@ -52,16 +52,14 @@ def repository(tmp_path, monkeypatch):
         ("[a](../../../core/extensions/trace/docs/how-to/trace.md#x)", "[a](trace.md#x)"),
         ("[a](../../../core/extensions/gone/docs/how-to/gone.md#x)", "a"),
         ("[a](../../../core/extensions/trace/docs/gone.md)", "[a](../gone.md)"),  # MkDocs warns
-        ("::: kincheck.core.extensions.gone.x.Y\n", ""),
+        ("::: kincheck.core.extensions.gone.x.Y\nend", "end"),
         ("[a](#kincheck.core.extensions.gone.x.Y)", "a"),
         ("::: kincheck.core.extensions.trace.x.Y\n", None),
         ("[a](forces.md), [b](https://example.org/x.md)", None),
     ],
 )
 def test_link_of_kernel(repository, written, in_site):
-    assert COLLECTED.in_site(written, COLLECTED.KERNEL, "how-to/a.md") == (
-        written if in_site is None else in_site
-    )
+    assert COLLECTED.in_site(written, COLLECTED.KERNEL, "how-to/a.md") == (in_site or written)
 
 
 def test_link_from_extension_to_kernel(repository):
