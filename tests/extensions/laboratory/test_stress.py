@@ -22,6 +22,7 @@ from kincheck.core.extensions.laboratory.stress.families.linkages import (
     crank_rocker,
     four_bar,
 )
+from kincheck.core.extensions.laboratory.stress.margins import NAMES, verdicts_without
 from kincheck.core.extensions.laboratory.stress.reduction import judge as judge_file
 from kincheck.core.extensions.laboratory.stress.reduction import reduce_case, round_geometry
 from kincheck.core.extensions.laboratory.stress.report import report
@@ -504,3 +505,12 @@ def test_reduction_drops_loads_of_removed_parts():
     assert [each.name for each in small.mechanism.moving] == ["crank"]
     assert small.mechanism.body("crank").mass == 2.0
     assert small.mechanism.gravity == GRAVITY
+
+
+def test_margin_left_out_changes_verdicts():
+    draws = specimens(FAMILIES["tolerances"], 0, 12)
+    every = verdicts_without(draws)
+    assert set(every) <= {"right", "refused, right reason"}
+    assert "closed" in NAMES
+    assert verdicts_without(draws, "closed") != every
+    assert verdicts_without(draws) == every
