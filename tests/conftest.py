@@ -13,6 +13,7 @@ from hypothesis import settings
 from kincheck.core import Joint
 from kincheck.core.caches import clear_caches
 from kincheck.core.cli import main as cli
+from kincheck.core.doors import extensions
 from kincheck.core.harness import execution, provenance
 from kincheck.core.harness.provenance import truth_of
 
@@ -62,6 +63,13 @@ def pytest_collection_modifyitems(items):
             names = [each.split(",")[0] if isinstance(each, str) else each[0] for each in lists]
             if sum(item.callspec.indices[name] for name in names) % step:
                 item.add_marker("nightly")
+
+
+def pytest_runtest_setup(item):
+    """Skip a test that `needs(name)` an extension that is not there."""
+    for each in item.iter_markers("needs"):
+        if absent := set(each.args) - extensions().keys():
+            pytest.skip(f"without {', '.join(sorted(absent))}")
 
 
 def pytest_collection_finish():

@@ -37,7 +37,7 @@ from ..support.driven_chains import (
     pushed_slide,
 )
 from ..support.engine_forces import Beside, force_case, pushed, sweep_case, values
-from ..support.engine_motion import cutting, installed, way_by_day
+from ..support.engine_motion import SIMULATORS, cutting, installed, way_by_day
 from ..support.joint_loops import TYPES, on_crank
 from ..support.loads import loaded
 from ..support.mechanisms import ORIGIN
@@ -105,7 +105,7 @@ def _curved(rng, mechanism):
     return replace(mechanism, couplers=couplers)
 
 
-ENGINES = ["exudyn", "mujoco", "pinocchio", "dart", "drake", "simbody"]
+ENGINES = SIMULATORS
 # Of the largest force. Exudyn has no acceleration: it is a difference of Jacobians.
 AGREE = dict.fromkeys(["native", *ENGINES], 1e-12) | {"exudyn": 1e-9}
 OF_ENGINES = pytest.mark.parametrize("engine", ENGINES)
@@ -255,7 +255,7 @@ def test_spring_on_cut_joint_counts_turns(engine):
 
 @OF_ENGINES
 def test_forces_absent_without_force_outputs(engine):
-    plain, given = cases.load("mcpherson_suspension"), installed(engine)
+    plain, given = cases.load("mcpherson_strut"), installed(engine)
     case = replace(plain, mechanism=loaded(plain.mechanism))
     found, bare = (given.solve(given.build(each), each, 1e-12) for each in (case, plain))
     assert found.forces is None

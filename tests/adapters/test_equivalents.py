@@ -85,6 +85,7 @@ def test_user_joint_solved_by_every_engine(name):
     assert found.details.get("equivalents") == expected
 
 
+@pytest.mark.needs("simulate")
 @pytest.mark.parametrize(("name", "atol"), [("mujoco", 1e-4), ("exudyn-static", 1e-9)])
 def test_user_joint_equivalent_is_simulated(name, atol):
     found = solved(installed(name, "simulate"))

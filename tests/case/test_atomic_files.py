@@ -56,6 +56,7 @@ def test_pipes_take_several_texts(tmp_path):
         os.close(each)
 
 
+@pytest.mark.needs("explain", "assemblies")
 @pytest.mark.skipif(
     not os.path.exists("/dev/full"), reason="there is no device that is always full"
 )

@@ -23,8 +23,8 @@ misspelt output type | [outputs.tip_x]\\n
     | outputs.tip_x.tyep ... unknown key ... did you mean 'type'?
 unknown key far off | atol = 1e-9 | atol = 1e-9\\nqqq = 1
     | outputs.tip_x.qqq ... unknown key ... remove it
-unknown output | [outputs.tip_x]\\n | [outputs.tip_x]\\ntype = "cambr"\\n
-    | outputs.tip_x.type ... 'cambr', expected an output type; did you mean 'camber'?
+unknown output | [outputs.tip_x]\\n | [outputs.tip_x]\\ntype = "joint_forc"\\n
+    | outputs.tip_x.type ... 'joint_forc', expected an output type; did you mean 'joint_force'?
 wrong schema | kincheck-case/1 | kincheck-case/9
     | schema ... kincheck-case/9 ... expected "kincheck-case/1"
 no schema | schema = "kincheck-case/1" |  | schema ... found none

@@ -184,6 +184,7 @@ def test_file_name_stays_in_folder(name, tmp_path):
     assert not re.search(r"[/\\:]", file_name(name))
 
 
+@pytest.mark.needs("proofs")
 def test_written_reference_stays_in_folder(kincheck_main, tmp_path):
     pytest.importorskip("flint")
     (tmp_path / "proofs").mkdir()
@@ -195,6 +196,7 @@ def test_written_reference_stays_in_folder(kincheck_main, tmp_path):
     ]
 
 
+@pytest.mark.needs("proofs")
 def test_two_references_of_one_file(kincheck_main, tmp_path, capsys):
     cases = {name: replace(crank(reference=False), name=name) for name in ("a/b", "a:b")}
     assert kincheck_main("reference", *cases, "--out", tmp_path, cases=cases) == 2

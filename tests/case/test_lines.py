@@ -80,6 +80,7 @@ def test_each_key_has_its_line(tree, seed):
             assert line_of(path, keys_of(text, root)) == line_with(text, number), (path, text)
 
 
+@pytest.mark.needs("yaml")
 @settings(deadline=None, max_examples=25)
 @given(st.dictionaries(NAMES, TREES, min_size=1, max_size=4), st.booleans())
 def test_yaml_key_has_its_line(tmp_path_factory, tree, flow):

@@ -117,6 +117,7 @@ def test_rod_note_quotes_length(tmp_path, number, unit):
     assert f"length {plain(float(number))} {unit}, points 1234.5 {unit} apart" in found
 
 
+@pytest.mark.needs("hardpoints")
 @quick
 @given(number=numbers, unit=st.sampled_from(["mm", "m"]))
 def test_wheel_on_other_side_is_quoted(tmp_path, number, unit):
@@ -138,6 +139,7 @@ wheel_center,0.2,WHEEL,0
 """
 
 
+@pytest.mark.needs("hardpoints")
 @pytest.mark.parametrize("unit", [*LENGTHS])
 @pytest.mark.parametrize(
     ("upper", "wheel", "axes", "words"),

@@ -111,6 +111,7 @@ def test_sheet_with_gap_is_read(tmp_path, fewer_rows):
     assert [row for _, row in sheet.sheet] == [[1.0], [2.0]]
 
 
+@pytest.mark.needs("hardpoints")
 def test_table_of_many_columns_is_refused(tmp_path):
     file = write(tmp_path, "a,b\n1" + "," * table.MOST_COLUMNS_OF_TEXT, "table.csv")
     said = f"line 2: found more than {table.MOST_COLUMNS_OF_TEXT} columns"

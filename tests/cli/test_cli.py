@@ -131,8 +131,6 @@ cran[q] | no built-in case and no file matches 'cran[q]'
 --jobs -1 | '-1' is not a whole number of 0 or more. Give one
 --timeout 5
     | cannot be limited. Leave out --timeout and --memory, or --jobs
---scheduler tcp://there:8786
-    | --scheduler: the cluster decides how many pairs run at a time. Leave out --jobs
 --resume | --resume needs a history. Give --history FILE, or set KINCHECK_HISTORY
 """
 

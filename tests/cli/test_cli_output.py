@@ -103,6 +103,7 @@ def test_contradictory_length_is_noted_in_results(tmp_path, capsys, length, note
     assert (f"note: {note}" in to_junit(results).decode()) is noted
 
 
+@pytest.mark.needs("explain")
 @pytest.mark.parametrize("length", ["1.1", "1.0"])
 def test_contradictory_length_is_noted_by_explain(tmp_path, capsys, length):
     file, vary, out = tmp_path / "rod.toml", tmp_path / "vary.toml", tmp_path / "out"

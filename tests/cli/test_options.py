@@ -146,6 +146,7 @@ def test_shared_output_file_is_refused(line, option, other, here, capsys):
     assert not [*(here / "no").iterdir()]
 
 
+@pytest.mark.needs("exports", "writers")
 def test_export_constraints_file_keeps_json(here, capsys):
     line = "assemblies four_bar --samples 8 --export urdf --out x.urdf --json x.constraints.json"
     assert main(line.split()) == 2

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from kincheck.core.cli.main import main
+from kincheck.core.cli.main import every_command, main
 
 VARY = {
     "schema": "kincheck-vary/1",
@@ -34,6 +34,7 @@ OPTIONS = [
     (("stress", "--family", "arms", "--samples", "1"), "--json"),
     (("bench", "formulation"), "--json"),
 ]
+OPTIONS = [each for each in OPTIONS if each[0][0] in every_command()]
 
 
 @pytest.fixture
@@ -57,6 +58,7 @@ def test_impossible_output_file_is_refused(here, capsys, command, option, name):
     assert captured.out == ""
 
 
+@pytest.mark.needs("explain", "assemblies")
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 @pytest.mark.parametrize(
     ("command", "said"),
@@ -72,6 +74,7 @@ def test_full_disk_still_prints_answer(capsys, command, said):
     assert captured.err.startswith("kincheck: --json /dev/full: cannot be written (No space left")
 
 
+@pytest.mark.needs("proofs")
 def test_reference_continues_after_failed_file(here, capsys):
     Path("out").mkdir()
     Path("out", "five_bar.reference.json").symlink_to("/dev/full")
@@ -98,6 +101,7 @@ sys.exit(main())
 """
 
 
+@pytest.mark.needs("sweep")
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes")
 def test_full_disk_keeps_previous_store(here):
     pytest.importorskip("pyarrow.parquet")
@@ -137,6 +141,7 @@ sys.exit(main())
 """
 
 
+@pytest.mark.needs("sweep")
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_killed_sweep_keeps_previous_store(here):
     pytest.importorskip("pyarrow.parquet")
@@ -150,6 +155,7 @@ def test_killed_sweep_keeps_previous_store(here):
     assert Path("all.parquet").read_bytes() == b"an earlier study"
 
 
+@pytest.mark.needs("explain", "trees")
 def test_overlong_case_names_are_refused(here, capsys):
     name = "x" * 300
     Path("model.xml").write_text(f'<mujoco><include file="{name}"/></mujoco>')

@@ -9,11 +9,12 @@ import pytest
 from kincheck import cases
 from kincheck.core import Revolute
 from kincheck.core.cli.joint_loading import named_joint
-from kincheck.core.cli.main import main
+from kincheck.core.cli.main import every_command, main
 from kincheck.core.harness.provenance import truth_of
 from kincheck.core.options import whole
 from kincheck.core.report.terminal import columns, console
 
+from ..support.case_texts import at_hand, rows
 from ..support.fakes import Fake
 
 RIGHT = Fake("native")
@@ -37,6 +38,7 @@ def test_case_pattern_selects_built_in_cases(kincheck_main, capsys):
     assert "1 pass" in capsys.readouterr().out
 
 
+@pytest.mark.needs("explain")
 def test_explain_refuses_pattern_of_several_cases(kincheck_main, capsys):
     assert kincheck_main("explain cran*", engines=[RIGHT]) == 2
     said = capsys.readouterr().err
@@ -61,19 +63,22 @@ def test_quiet_and_verbose_output(kincheck_main, capsys):
     assert capsys.readouterr().out.split() == ["crank", "crank_two", "native"]
 
 
+USAGE = """
+runn | kincheck: error: there is no command 'runn'; did you mean 'run'?
+--engine native run | it belongs to kincheck run
+bench --rounds 3 | '--rounds'; it belongs to kincheck bench engines
+sweep --sample 1e3 --vari f | kincheck sweep: error:
+run --mode projecton | projection, simulate; did you mean 'projection'?\\n
+run --mode dream | 'dream' is none of projection, simulate\\n
+sweep --varry f | no option '--varry'; did you mean '--vary'?
+explain rssr bennett | kincheck explain: error: too many arguments: bennett
+export rssr --at nan | 'nan' is not a number
+"""
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
-    [
-        ("runn", "kincheck: error: there is no command 'runn'; did you mean 'run'?"),
-        ("--engine native run", "it belongs to kincheck run"),
-        ("bench --rounds 3", "'--rounds'; it belongs to kincheck bench engines"),
-        ("sweep --sample 1e3 --vari f", "kincheck sweep: error: "),
-        ("run --mode projecton", "projection, simulate; did you mean 'projection'?\n"),
-        ("run --mode dream", "'dream' is none of projection, simulate\n"),
-        ("sweep --varry f", "no option '--varry'; did you mean '--vary'?"),
-        ("explain rssr bennett", "kincheck explain: error: too many arguments: bennett"),
-        ("export rssr --at nan", "'nan' is not a number"),
-    ],
+    at_hand(rows(USAGE, named=False), {*every_command(), "runn", "--engine"}),
 )
 def test_usage_errors_state_command_and_remedy(line, said, capsys):
     assert main(line.split()) == 2
@@ -119,6 +124,7 @@ echo "${{COMPREPLY[@]}}"
 """
 
 
+@pytest.mark.needs("exports", "explain", "laboratory", "simulate")
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 def test_bash_completion_of_commands_and_values(tmp_path, capsys):
     pytest.importorskip("shtab")
@@ -139,7 +145,12 @@ def test_bash_completion_of_commands_and_values(tmp_path, capsys):
 
 @pytest.mark.parametrize(
     "argv",
-    [["list", "--schema"], ["list", "--joints"], ["list", "--outputs"], ["stress", "--list"]],
+    [
+        ["list", "--schema"],
+        ["list", "--joints"],
+        ["list", "--outputs"],
+        pytest.param(["stress", "--list"], marks=pytest.mark.needs("laboratory")),
+    ],
     ids=" ".join,
 )
 def test_lists_keep_words_within_console_width(argv, capsys, monkeypatch):
@@ -215,6 +226,7 @@ half_width = 0.1
 """
 
 
+@pytest.mark.needs("sweep")
 def test_undetermined_force_is_explained(tmp_path, capsys):
     (case := tmp_path / "two_hinges.toml").write_text(UNDETERMINED)
     main(f"run {case} --engine native -v".split())
@@ -226,6 +238,7 @@ def test_undetermined_force_is_explained(tmp_path, capsys):
     assert "None" not in out
 
 
+@pytest.mark.needs("hardpoints")
 def test_repr_of_case_is_one_line():
     case = cases.load("mcpherson_suspension")
     assert any(point.name.startswith("~") for point in case.mechanism.points)

@@ -6,6 +6,7 @@
 - A block of any language with a title is a file of that name.
 - Other languages are not run. A comment before a block, `<!-- not run: REASON -->`, excuses it;
   `<!-- status: 1 -->` gives the exit status of its last command.
+- `<!-- needs: NAME ... -->` at the end names extensions whose commands the blocks use.
 
 A number in shown output stands for any number, a line "..." for any lines, and " ..." at the end of
 a line for its rest.

@@ -3,6 +3,7 @@
 import re
 
 import kincheck.cases
+import pytest
 from kincheck.core.case.case import Truth
 
 from ..support.sources import ROOT
@@ -14,6 +15,7 @@ SENTENCE = re.compile(
 )
 
 
+@pytest.mark.needs("free", "hardpoints")
 def test_counts_of_cases_in_pages():
     library = [kincheck.cases.load(name) for name in kincheck.cases.names()]
     closed = [case for case in library if case.truth is Truth.CLOSED_FORM]

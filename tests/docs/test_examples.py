@@ -42,6 +42,12 @@ def commands_folder(tmp_path_factory):
             server.kill()
 
 
+def needs(page):
+    """The extensions without which the examples of a page do not run."""
+    named = re.search(r"^<!-- needs: (.*) -->$", page.read_text("utf-8"), re.MULTILINE)
+    return pytest.mark.needs(*(named[1].split() if named else ()))
+
+
 class Reader:
     """Someone who works through a page in an empty folder.
 
@@ -87,7 +93,10 @@ class Reader:
 
 @pytest.mark.parametrize(
     "path",
-    [README, *(pytest.param(page, marks=pytest.mark.nightly) for page in PAGES)],
+    [
+        pytest.param(page, marks=[needs(page), *([] if page == README else [pytest.mark.nightly])])
+        for page in (README, *PAGES)
+    ],
     ids=lambda path: str(path.relative_to(ROOT)),
 )
 def test_documentation_examples_run_as_printed(

@@ -76,6 +76,7 @@ def test_reference_pages_list_commands_and_types():
     assert "[closure]" in pages["reference/case-file.md"]
 
 
+@pytest.mark.needs("laboratory")
 def test_site_finds_described_names():
     """It reads sources, so what an extension offers by kincheck.core is described where it is
     defined.

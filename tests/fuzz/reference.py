@@ -13,6 +13,7 @@ from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import CurveOptions
 from kincheck.core.cli.shared_options import with_references
+from kincheck.core.doors import offers
 
 from ..support.case_texts import BASE
 from .fuzzing import changing, read_or_refused, written
@@ -61,7 +62,7 @@ def one(data: bytes) -> None:
     """Read one input as the table of a case with one output, or of a suspension where it is about
     one.
     """
-    if data.startswith(CURVE):
+    if data.startswith(CURVE) and offers("references"):
         file = written("curve.csv", data)
         read_or_refused(lambda: with_references([car()], [file], OPTIONS, None)[0][0])
         return
@@ -90,8 +91,8 @@ def case(table: str, suspension: bool) -> Path:
 
 def seeds() -> list[bytes]:
     """A table, a proved reference, five rows of a suspension's, and curves of a rig."""
-    every = seeds_in_file("reference")
-    return [each for each in every if KNOWN or not (each.startswith(CURVE) or b"camber" in each)]
+    every, whole = seeds_in_file("reference"), KNOWN and offers("references")
+    return [each for each in every if whole or not (each.startswith(CURVE) or b"camber" in each)]
 
 
 mutate = changing(changed_json, changed_lines, words=WORDS)

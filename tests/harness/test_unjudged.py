@@ -406,6 +406,7 @@ def test_derivative_output_has_one_order_less(rates):
     ) is not bool(rates)
 
 
+@pytest.mark.needs("hardpoints")
 def test_complete_reference_needs_no_native():
     """Of outputs that are derivatives there is no acceleration."""
     case, native = cases.load("mcpherson_suspension"), Fake("native")

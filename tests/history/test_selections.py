@@ -141,8 +141,14 @@ def test_same_name_in_folders(run, report, monkeypatch, tmp_path, again, status)
 
 @pytest.mark.parametrize(
     "more",
-    [("--static",), ("--engine-command", "true {case} {samples} {out}")],
-    ids=["static", "engine command"],
+    [
+        pytest.param(("--static",), id="static"),
+        pytest.param(
+            ("--engine-command", "true {case} {samples} {out}"),
+            id="engine command",
+            marks=pytest.mark.needs("recorded"),
+        ),
+    ],
 )
 def test_task_options_change_selection(run, tmp_path, more):
     run(*NIGHT)

@@ -114,6 +114,7 @@ def test_planar_turn_in_all_engines(case):
         assert record.outcome is Outcome.PASS, record
 
 
+@pytest.mark.needs("simulate")
 @pytest.mark.parametrize("name", ["mujoco-projecting", "pinocchio", "exudyn-static"])
 def test_planar_turn_by_simulation(case, name):
     """Of those with drift by what they drift; a turn lost, or of the other sense, is off by a

@@ -8,7 +8,6 @@ import re
 
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.adapters.shared.force_solution import curve_force, elastic_torque
 from kincheck.core.algebra import ZERO, Quat, vec
 from kincheck.core.case.io.case_file import case_text, load_case
@@ -21,6 +20,7 @@ from kincheck.core.mechanism.loads import Bushing
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism
 from kincheck.core.primitives.base import Pose
 
+from ..support.engine_motion import ENGINES, installed
 from ..support.loads import solved, traced
 from ..support.mechanisms import ORIGIN
 
@@ -110,11 +110,9 @@ def test_bushing_power_is_balanced(tmp_path, law):
 
 
 @pytest.mark.parametrize("law", TORQUES)
-@pytest.mark.parametrize("engine", ["pinocchio", "mujoco", "exudyn", "drake", "dart", "simbody"])
+@ENGINES
 def test_bushing_forces_agree_in_all_engines(tmp_path, law, engine):
-    engine, native = adapters.engine(engine), adapters.engine("native")
-    if engine.version() is None:
-        pytest.skip(f"{engine.name} is not installed here")
+    engine, native = installed(engine), installed("native")
     case = bushed(tmp_path, law)
     expected, found = (
         each.solve(each.build(case), case, 1e-12).forces for each in (native, engine)

@@ -328,6 +328,7 @@ def wanted(kind):
     return WantedOutput(kind("wheel_x", "wheel", (1.0, 0.0, 0.0), True, 1e-9, 0.0, "test"))
 
 
+@pytest.mark.needs("llvm")
 def test_program_cache_key_covers_equations(tmp_path, monkeypatch):
     """Programs of varied places with outputs are found again; not after a change of a file beside
     the output's, and those of an output of the user never.
@@ -350,6 +351,7 @@ def test_program_cache_key_covers_equations(tmp_path, monkeypatch):
     assert str(pathlib.Path(quantity.__file__).parent) in folders
 
 
+@pytest.mark.needs("llvm")
 def test_new_numbers_need_no_new_trace(tmp_path, monkeypatch):
     """Programs of varied places serve any numbers there: those found again equal those traced."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

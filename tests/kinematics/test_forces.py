@@ -255,6 +255,7 @@ def test_forces_beyond_lock_up_are_nan():
     assert found.facts["forces"]["power_missing"] <= 1e-13
 
 
+@pytest.mark.needs("blocks")
 def test_large_mechanism_forces_by_svd():
     mechanism = loaded(chain(21))
     found = solve(mechanism, "turn", [0.1, 0.2], forces=["turn"])

@@ -240,6 +240,7 @@ def test_drivers_of_same_freedom():
         solve(same, "turn", [0.0])
 
 
+@pytest.mark.needs("laboratory")
 @pytest.mark.parametrize("style", ["native", "mixed", "conventional"])
 def test_locked_driver_names_its_joints(style):
     pushed = replace(slider_crank(), drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))])

@@ -128,7 +128,7 @@ def by_engine(engine):
 ENGINES = {"mujoco": MuJoCo, "pinocchio": Pinocchio, "exudyn": Exudyn}
 WAYS = [
     *(pytest.param(by_style(style), id=style) for style in styles()),
-    pytest.param(by_sparse, id="sparse"),
+    pytest.param(by_sparse, id="sparse", marks=pytest.mark.needs("blocks")),
     *(
         pytest.param(
             by_engine(make()),
@@ -324,6 +324,7 @@ def test_start_with_one_reachable_way(solved):
 # Components, many designs, simulators and proofs start as a sweep does
 
 
+@pytest.mark.needs("blocks")
 def test_components_start_at_typed_phase():
     for phase in (math.pi, six(math.pi)):
         path = Path({"turn": Sine(-1.2, 0.2, phase)}, TIMES)
@@ -373,6 +374,7 @@ def test_study_notes_assumed_start(phase, said, tmp_path):
     assert any("go straight" in note for note in found.run["cases"]["case"]["notes"]) == said
 
 
+@pytest.mark.needs("simulate")
 def test_simulator_starts_at_typed_phase():
     """Turns of a coupled joint are counted from the design, where a typed phase begins as well as
     an exact one.

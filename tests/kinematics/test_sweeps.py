@@ -205,14 +205,18 @@ def test_arm_on_ball_and_rods():
 # Sweeps to the ends of travel and beyond, and steps of many turns
 
 
+IN_BLOCKS = pytest.mark.needs("blocks")
+
+
 @pytest.mark.parametrize(
     ("way", "turn", "solved"),
     [
         (Method.ONE_PROGRAM, 1000.0, True),
         (Method.ONE_PROGRAM, 1e6, False),
-        (Method.BY_COMPONENTS, 1000.0, True),
-        (Method.BY_COMPONENTS, 1e6, False),
-        (Method.SPARSE, 100.0, True),  # a part takes it a hundred times as long
+        pytest.param(Method.BY_COMPONENTS, 1000.0, True, marks=IN_BLOCKS),
+        pytest.param(Method.BY_COMPONENTS, 1e6, False, marks=IN_BLOCKS),
+        # a part takes it a hundred times as long
+        pytest.param(Method.SPARSE, 100.0, True, marks=IN_BLOCKS),
     ],
 )
 def test_step_of_many_turns(way, turn, solved):

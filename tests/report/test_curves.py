@@ -118,6 +118,7 @@ def table(tmp_path_factory):
     return file
 
 
+@pytest.mark.needs("hardpoints")
 def test_table_curves_have_file_units(table, tmp_path):
     wide, long, book = (tmp_path / name for name in ("wide.csv", "long.csv", "wide.xlsx"))
     command = ["run", str(table), "--engine", "native"]
@@ -141,6 +142,7 @@ def test_table_curves_have_file_units(table, tmp_path):
         assert row == pytest.approx(expected, rel=1e-15)  # workbooks keep 16 digits
 
 
+@pytest.mark.needs("hardpoints")
 def test_wide_curves_name_engines_and_references(table, tmp_path):
     first, second = tmp_path / "first.csv", tmp_path / "second.csv"
     main(["run", str(table), "--engine", "native", "--csv", str(first)])
@@ -152,6 +154,7 @@ def test_wide_curves_name_engines_and_references(table, tmp_path):
     assert float(toes["native"]) == pytest.approx(float(toes["reference"]), abs=1e-12)
 
 
+@pytest.mark.needs("hardpoints")
 def test_table_prints_rebound_design_and_jounce(table, capsys):
     main(["run", str(table), "--engine", "native"])
     printed = capsys.readouterr().out

@@ -125,6 +125,7 @@ def star(count):
     )
 
 
+@pytest.mark.needs("hardpoints")
 def test_scene_omits_marker_points():
     shown = scene(cases.load("mcpherson_suspension"), poses=False)
     names = [point.name for point in shown.points]

@@ -235,6 +235,7 @@ steps = 5
 """
 
 
+@pytest.mark.needs("explain")
 def test_case_file_uses_joint_type_option(in_folder, capsys, tmp_path, monkeypatch):
     """A Scotch yoke: the block is where the pin's height is, 0.5 sin(turn)."""
     monkeypatch.delitem(Joint.registry, "pin_in_slot", raising=False)

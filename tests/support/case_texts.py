@@ -98,7 +98,7 @@ def at_hand(table, names):
     """The rows of a table whose first word is one of some names, such as of commands: extensions
     bring them.
     """
-    return [row for row in table if re.match(r"\w+", row.values[0])[0] in names]
+    return [row for row in table if re.match(r"[-\w]+", row.values[0])[0] in names]
 
 
 def supplied(text):

@@ -220,6 +220,12 @@ def test_commands_refuse_invalid_scheduler(kincheck_main, capsys, tmp_path, monk
     assert not (tmp_path / "h.db").exists()
 
 
+def test_cluster_decides_number_of_jobs(kincheck_main, capsys):
+    assert kincheck_main("run crank --scheduler tcp://there:8786", jobs="2") == 2
+    said = "--scheduler: the cluster decides how many pairs run at a time. Leave out --jobs"
+    assert said in capsys.readouterr().err
+
+
 def test_missing_dask_names_package(monkeypatch):
     def absent(name):
         raise ImportError(name)

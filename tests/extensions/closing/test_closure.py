@@ -9,8 +9,8 @@ from kincheck.core.cli.main import main
 from kincheck.core.kinematics import degrees_of_freedom, solve
 from scipy.spatial.transform import Rotation
 
-from ..support.case_texts import complains
-from ..support.four_bar_within_digits import BODIES, written
+from ...support.case_texts import complains
+from ...support.four_bar_within_digits import BODIES, written
 
 TILT = 1e-6
 TILTED = {"a": (TILT, 1.0, 0.0)}

@@ -16,7 +16,7 @@ from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
 from scipy.optimize import brentq
 
-from ..support.fakes import record_of
+from ...support.fakes import record_of
 
 G = 9.81
 ARM = """
