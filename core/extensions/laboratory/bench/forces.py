@@ -25,10 +25,10 @@ def measure(cases: Mapping[str, Case], rounds: int, tol: float = 1e-12) -> dict[
     """
     work: dict[tuple[str, str], Work] = {}
     for name, case in cases.items():
-        mechanism, path, points = case.mechanism, case.sweep.path, case.points
+        mechanism = case.mechanism
         of = (*mechanism.given_joints, *mechanism.drivers, *mechanism.forces)
-        motion = NativeSolver().prepare(mechanism, path, points)
-        forces = NativeSolver().prepare(mechanism, path, points, (), [x.name for x in of])
+        prepare = partial(NativeSolver().prepare, mechanism, case.sweep.path, case.points)
+        motion, forces = prepare(), prepare(forces=[each.name for each in of])
         ways = partial(motion, tol), partial(forces, tol), partial(_read, forces, tol)
         work |= {(name, what): each for what, each in zip(WAYS, ways, strict=True)}
     seconds = take_turns(work, rounds, clock=process_time)
