@@ -108,15 +108,6 @@ class OpenError(CaseError):
         found = [(f"--{name.replace('_', '-')}", text) for name, text in self.stated.items()]
         return [each for pair in found for each in pair]
 
-    def with_others(self, other: OpenError) -> OpenError:
-        """Return one question of two."""
-        return OpenError(
-            self.file,
-            [*self.why, *other.why],
-            {**self.stated, **other.stated},
-            {**self.writes, **other.writes},
-        )
-
 
 class SolveError(KincheckError, RuntimeError):
     """The mechanism cannot be solved as described: freedom left, contradiction, or no assembly."""

@@ -11,7 +11,6 @@ from ..mechanism.motions import Path
 from .compiled.compiled_model import Model, compile_model
 from .compiled.request import LAST_ITERATION, Request
 from .compiled.routes import Route
-from .compiled.step_programs import ALONE, JOINED
 from .forces.wanted import wanted_forces
 from .formulation.styles import NATIVE
 from .motion_solver import Method, Solver, by_method
@@ -138,18 +137,3 @@ class ProgramSize:
             account.redundant_rows,
             {name: each["flops"] for name, each in model.sizes.items()},
         )
-
-    def of_sample(self, iterations: float, *, motions: bool = False) -> float:
-        """Return the floating-point operations of a sample: predictor, Newton's iterations, rates,
-        outputs and the test of a solution.
-
-        Operations of rejected lanes, and further iterations for a neighbour's sake, do not count.
-
-        Args:
-            iterations: Newton's iterations of the sample.
-            motions: lanes are motions of their own, of varied geometry, and not samples of one
-                motion; the first few samples of a motion use other programs.
-        """
-        tests = ("extend", *ALONE) if motions else ("extrapolate", *JOINED)
-        once = sum(self.flops[name] for name in ("outputs", *tests))
-        return iterations * self.flops["newton"] + once

@@ -188,6 +188,7 @@ def _sign(x: Scalar) -> Scalar:
 
 class Elimination:
     """A factored matrix. `pivots` are the traced ones; a small one means a nearly singular matrix.
+    `cores` are what is left without sparse pivots, dense blocks.
 
     Args:
         rows: the square matrix, each row a mapping column -> entry without zeros.
@@ -202,8 +203,8 @@ class Elimination:
         self._sparse = self._eliminate_sparse(entries)
         done_rows = {pivot.row for pivot in self._sparse}
         left_rows = [i for i in range(self.n) if i not in done_rows]
-        self._cores = [Core(entries, *block) for block in _blocks(entries, left_rows)]
-        for core in self._cores:
+        self.cores = [Core(entries, *block) for block in _blocks(entries, left_rows)]
+        for core in self.cores:
             self.pivots += core.pivots
 
     @property
@@ -222,7 +223,7 @@ class Elimination:
         """
         found = dict[int, Scalar]()
         sizes = [(row, absolute(x)) for row, x in self._alone] + [
-            (core.rows[0], core.least_stretch) for core in self._cores
+            (core.rows[0], core.least_stretch) for core in self.cores
         ]
         for row, size in sizes:
             block = self._block_of_row[row]
@@ -249,16 +250,11 @@ class Elimination:
     def _signs(self) -> Iterator[Scalar]:
         for _, x in self._alone:
             yield _sign(x)
-        for core in self._cores:
+        for core in self.cores:
             exchanged = (
                 where_larger(x, y, -1.0, 1.0) for step in core.steps for _, x, y in step.exchanges
             )
             yield reduce(mul, exchanged, reduce(mul, (_sign(x) for x in core.pivots)))
-
-    @property
-    def core_size(self) -> int:
-        """Order of the largest dense core."""
-        return max((len(core.rows) for core in self._cores), default=0)
 
     def _eliminate_sparse(self, entries: list[dict[int, Scalar]]) -> list[_Pivot]:
         rows, steps = set(range(self.n)), list[_Pivot]()
@@ -306,7 +302,7 @@ class Elimination:
             if not is_literal_zero(b[pivot.row]):
                 for i, factor in pivot.multipliers:
                     b[i] = b[i] - factor * b[pivot.row]
-        for core in self._cores:
+        for core in self.cores:
             core.solve(b, x)
         for pivot in reversed(self._sparse):
             value = b[pivot.row]
@@ -325,7 +321,7 @@ class Elimination:
             y[pivot.row] = value = c[pivot.column] * pivot.inverse
             for j, entry in pivot.rest:
                 c[j] = c[j] - entry * value
-        for core in reversed(self._cores):
+        for core in reversed(self.cores):
             core.solve_transposed(c, y)
         for pivot in reversed(self._sparse):
             for i, factor in pivot.multipliers:

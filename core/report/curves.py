@@ -5,11 +5,10 @@ per output, engine (or reference) and sample, because their outputs and samples 
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ..case.io.table_file import WRITERS, Kind, Rows, put_csv
+from ..case.io.table_file import WRITERS, Kind, Rows, csv_text
 from ..harness.record import Facts, OutputSeries, Record, Results
 from ..harness.table_units import DRIVER_UNITS, in_table_units, is_table
 
@@ -153,9 +152,7 @@ def downloads(results: Results, cases: Mapping[str, str]) -> dict[str, str]:
 
 def csv_of(results: Results, case: str) -> str:
     """Return the curves of a case as the text of a CSV file."""
-    text = io.StringIO()
-    put_csv(text, long_columns(results), curves(results, case))
-    return text.getvalue()
+    return csv_text(long_columns(results), curves(results, case))
 
 
 def curves(results: Results, case: str | None = None) -> Iterator[Rows]:

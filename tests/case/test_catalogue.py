@@ -23,6 +23,8 @@ from kincheck.core.joints.base import directions, position
 from kincheck.core.mechanism.loads import ELEMENTS
 from kincheck.core.mechanism.motions import Motion
 
+from ..support.case_texts import validator
+
 # Rows as in textbooks: six less the freedoms left.
 ROWS = {
     "constant_velocity": 4,
@@ -142,16 +144,9 @@ def test_list_schema_prints_every_key(capsys):
     assert "kincheck-vary/1" in said
 
 
-jsonschema = pytest.importorskip("jsonschema")
 CASES = [*map(kincheck.cases.file, kincheck.cases.names())]
 DATA = Path(__file__).parents[1] / "data"
 OURS = [*CASES, *sorted((DATA / "case_files").glob("*.toml")), *sorted(DATA.glob("stress/*.toml"))]
-
-
-def validator(name):
-    schema = schema_of(name)
-    jsonschema.Draft202012Validator.check_schema(schema)
-    return jsonschema.Draft202012Validator(schema)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ import msgspec
 import pytest
 from kincheck.core.case.io.document import fault
 from kincheck.core.case.io.escape import cell, file_name, visible
-from kincheck.core.case.io.table_file import csv_text
+from kincheck.core.case.io.table_file import Kind, write_csv
 from kincheck.core.harness.record import Outcome, Results, to_json
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.page_model import Material
@@ -155,8 +155,9 @@ def test_hostile_name_in_json(name):
         assert msgspec.json.decode(to_json(run(name)), type=Results) == run(name)
 
 
-def test_hostile_name_in_csv(name):
-    _, row = csv.reader(io.StringIO(csv_text(["head"], [[name]])))
+def test_hostile_name_in_csv(name, tmp_path):
+    write_csv(file := tmp_path / "a.csv", {"head": Kind.TEXT}, [[[name]]])
+    _, row = csv.reader(file.read_text().splitlines())
     assert len(row) == 1
     assert row[0][:1] not in ("=", "+", "-", "@", "\t", "\r")
     assert row[0].isprintable()

@@ -5,14 +5,14 @@ import random
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.document import Section, fault
+from kincheck.core.case.io.document import Section, fault, parse_json
 from kincheck.core.case.io.lines import join, keys_of, line_of
 from kincheck.core.errors import CaseError
 
-from ..support.case_texts import edited, write
+from ..support.case_texts import edited, line_with, write
 from ..support.sources import ROOT
 
 NAMES = st.text("ab-_\" '#=]{}:,é\\", min_size=1, max_size=4).filter(lambda x: x == x.strip())
@@ -63,11 +63,6 @@ def in_line(value, rng):
         between = rng.choice([", ", ",\n", ", # ] \n"])
         return f"[{between.join(in_line(each, rng) for each in value)}]"
     return str(value)
-
-
-def line_with(text, number):
-    (line,) = (k for k, line in enumerate(text.splitlines(), 1) if str(number) in line)
-    return line
 
 
 @settings(deadline=None, max_examples=50)
@@ -124,6 +119,18 @@ def test_key_twice_is_named_with_line(tmp_path):
     line = file.read_text().splitlines().index("rate = 2.0") + 2
     with pytest.raises(CaseError, match=f"line {line}, column"):
         load_case(file)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.dictionaries(NAMES, TREES, min_size=1, max_size=4), st.integers(0, 9))
+def test_json_key_twice_has_line(tree, seed):
+    rows = json.dumps(tree, indent=1).splitlines()
+    keys = [k for k, row in enumerate(rows) if re.match(r' *+".*": 0,?$', row)]
+    assume(keys)
+    k = random.Random(seed).choice(keys)
+    text = "\n".join([*rows[:k], f"{rows[k].rstrip(',')},", *rows[k:]])
+    with pytest.raises(CaseError, match=rf"JSON: line {k + 2}: the key .+ is given twice"):
+        parse_json(ROOT / "a.json", text)
 
 
 def test_section_is_named_with_line(tmp_path):

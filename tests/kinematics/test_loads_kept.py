@@ -2,26 +2,16 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from kincheck.adapters.shared.equivalents import in_own_frame, own_frame
-from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.kinematics.formulation.parameters import placed, places
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.mechanism import Mechanism
 
-from ..support.loaded_slider_crank import GRAVITY, loaded, pushed
+from ..support.loaded_slider_crank import GRAVITY, case_of, loaded, pushed
 
 SIMULATION = "kincheck.adapters.simulate.simulation"
 REDUCTION = "kincheck.core.extensions.laboratory.stress.reduction"
-
-
-def case_of(mechanism: Mechanism) -> Case:
-    sweep = Sweep(mechanism.drivers[0].name, np.linspace(0.0, 0.25, 3))
-    return with_all_coordinates(
-        Case(mechanism.name, "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    )
 
 
 def same_loads(a: Mechanism, b: Mechanism) -> None:

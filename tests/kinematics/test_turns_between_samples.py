@@ -7,22 +7,12 @@ Where it stands says nothing of the turns, but a wheel that is geared to it does
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.core import (
-    Table,
-)
 from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.kinematics.formulation.styles import styles
 
-from ..support.mechanisms import X, Y, indexing, solve_all
-
-
-def indexed(turns):
-    """The turns between time zero and one, and rest before and after."""
-    rest = np.arange(-40.0, 41.0) * 0.01
-    values = np.repeat([0.0, 2.0 * np.pi * turns], len(rest))
-    return Table(tuple(np.concatenate([rest, 1.0 + rest])), tuple(values))
+from ..support.mechanisms import X, Y, indexed, indexing, solve_all
 
 
 def test_engines_count_turns_between_samples():

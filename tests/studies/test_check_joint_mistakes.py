@@ -32,6 +32,7 @@ from kincheck.core.studies.checks.joint_loops import (
     with_own_drivers,
 )
 
+from ..support.driven_chains import at_origins
 from ..support.engine_faults import changed
 from ..support.fakes import native_but
 
@@ -71,6 +72,7 @@ def doubled_rows(self, i, j):
 
 
 def rows_without_arm(self, i, j):
+    """The force acts at the origin of body j."""
     return tuple(row._replace(pj=ZERO) for row in super(type(self), self).rows(i, j))
 
 
@@ -157,11 +159,6 @@ def slow(self, i, j):
 
 def short(self, i, j):
     return tuple(x + 1e-3 * self.drive.c for x in super(type(self), self).phi(i, j))
-
-
-def at_the_origin(self, i, j):
-    """The force acts at the origin of body j."""
-    return tuple(row._replace(pj=ZERO) for row in super(type(self), self).rows(i, j))
 
 
 def beside_the_axis(self, i, j):
@@ -276,7 +273,7 @@ MISTAKES_OF_DRIVERS = {
     "a drive along a straight axis": lambda: driving(gamma=without_bending),
     "a drive a thousandth slow": lambda: driving(nu=slow),
     "a drive a thousandth short": lambda: driving(phi=short),
-    "a drive at the origin": lambda: driving(rows=at_the_origin),
+    "a drive at the origin": lambda: driving(rows=rows_without_arm),
     "a drive beside the axis": lambda: driving(rows=beside_the_axis),
     "a drive on one body": lambda: driving(rows=on_one_body),
     "a drive of twice the force": lambda: driving(rows=doubled_rows),
@@ -350,13 +347,6 @@ def failing(joint_type, case_of=with_loads):
     """The failing checks of reactions of a joint type, loaded or driven in its own coordinates."""
     found = reactions(solve_probe(case_of(probe(joint_type))))
     return [each.check.removeprefix("reaction: ") for each in found if each.verdict is Verdict.FAIL]
-
-
-def at_origins(self, freedom, i, j):
-    """Slides between the internal origins of the bodies, not at the joint's point."""
-    P, h = vec(self.point), unit(self.axis)
-    between = p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
-    return between if freedom == "translation" else p.DrivenAngle(h)
 
 
 @pytest.mark.parametrize("base", [Translational, Screw])

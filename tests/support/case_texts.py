@@ -7,6 +7,7 @@ import pytest
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
+from kincheck.core.cli.lists import schema_of
 from kincheck.core.errors import CaseError, OpenError
 
 BASE = """
@@ -105,3 +106,17 @@ def supplied(text):
     """Options of a reader from words NAME=VALUE, of which the last counts; without a value none."""
     pairs = (word.split("=", 1) for word in text.split())
     return Supplied(**{name: value or None for name, value in pairs})
+
+
+def line_with(text, number):
+    """The line of a text with a number."""
+    (line,) = (k for k, line in enumerate(text.splitlines(), 1) if str(number) in line)
+    return line
+
+
+def validator(name):
+    """The validator of a schema; skips without jsonschema."""
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = schema_of(name)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)

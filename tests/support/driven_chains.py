@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from kincheck.core import primitives as p
+from kincheck.core.algebra import ZERO, vec
 from kincheck.core.joints import (
     Coupler,
     Cylindrical,
@@ -18,6 +20,7 @@ from kincheck.core.joints import (
     Spline,
     Translational,
 )
+from kincheck.core.joints.base import unit
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
 from kincheck.core.mechanism.motions import (
@@ -267,3 +270,10 @@ for one in (T, R):
         COUPLINGS[f"spline, {one} by {other}"] = (of[one], of[other], by)
 turned = Link(Revolute, flipped=True), replace(by, driven=(2, T), driving=(3, R))
 COUPLINGS["spline by a turned hinge"] = (SLIDE, *turned)
+
+
+def at_origins(self, freedom, i, j):
+    """Slides between the internal origins of the bodies, not at the joint's point."""
+    P, h = vec(self.point), unit(self.axis)
+    between = p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
+    return between if freedom == "translation" else p.DrivenAngle(h)

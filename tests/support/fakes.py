@@ -165,3 +165,12 @@ def partial(case):
         velocity=v,
         acceleration=a,
     )
+
+
+def calls(monkeypatch, owner, name):
+    """The arguments of all calls from now on."""
+    every, call = [], getattr(owner, name)
+    monkeypatch.setattr(
+        owner, name, lambda *given, **named: (every.append(given), call(*given, **named))[1]
+    )
+    return every

@@ -1,5 +1,8 @@
 """A mechanism with every kind of load: a crank and slider beside the origin."""
 
+import numpy as np
+from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.joints import Distance, Revolute, Translational
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
@@ -47,3 +50,11 @@ def loaded(driver=None) -> Mechanism:
 def pushed() -> Mechanism:
     """Return the same, driven at its tip."""
     return loaded(PointCoordinate("push_tip", "tip", (1.0, 0.0, 0.0)))
+
+
+def case_of(mechanism: Mechanism) -> Case:
+    """A case of a mechanism with all coordinates, at three samples of its first driver."""
+    sweep = Sweep(mechanism.drivers[0].name, np.linspace(0.0, 0.25, 3))
+    return with_all_coordinates(
+        Case(mechanism.name, "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+    )

@@ -17,6 +17,7 @@ from kincheck.core import (
     Revolute,
     Screw,
     Spherical,
+    Table,
     Translational,
     Universal,
     solve,
@@ -292,3 +293,10 @@ def errors(motion, expected):
     found = [motion.position, motion.velocity, motion.acceleration]
     pairs = [(a, b) for a, b in zip(found, expected, strict=False) if a is not None]
     return np.array([np.abs(a - b).max() for a, b in pairs])
+
+
+def indexed(turns):
+    """The turns between time zero and one, and rest before and after."""
+    rest = np.arange(-40.0, 41.0) * 0.01
+    values = np.repeat([0.0, 2.0 * np.pi * turns], len(rest))
+    return Table(tuple(np.concatenate([rest, 1.0 + rest])), tuple(values))

@@ -13,7 +13,6 @@ import math
 import re
 import reprlib
 import tomllib
-from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
@@ -27,7 +26,7 @@ from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy, similar, 
 from ..units import METRE, FileUnits, Unit
 from .escape import visible
 from .foreign import binary, foreign
-from .lines import DEEPEST, TEXT, join, place
+from .lines import DEEPEST, TEXT, join, key_again, place
 
 # Squares and products of numbers within these bounds neither overflow nor underflow.
 LARGEST, SMALLEST = 1e100, 1e-100
@@ -163,9 +162,8 @@ def interval(parts: Sequence[str], units: Mapping[str, Unit], bare: str) -> tupl
     Raises:
         ValueError: as `measure`.
     """
-    stated = [unit for part in parts if (unit := measure(part, units, bare)[1])]
-    common = stated[0] if stated else bare
-    return [measure(part, units, common)[0] for part in parts], stated[0] if stated else ""
+    stated = next((unit for part in parts if (unit := measure(part, units, bare)[1])), "")
+    return [measure(part, units, stated or bare)[0] for part in parts], stated
 
 
 def read_bytes(file: Path, limit: int, why_limit: str) -> bytes:
@@ -265,7 +263,8 @@ def parse_json(file: Path, text: str, **hooks: Callable[[str], object]) -> Any:
     Raises:
         CaseError: the syntax is wrong, or a key is given twice.
     """
-    return _loaded(file, "JSON", partial(json.loads, object_pairs_hook=_once, **hooks), text)
+    once = partial(_once, text)
+    return _loaded(file, "JSON", partial(json.loads, object_pairs_hook=once, **hooks), text)
 
 
 def _loaded(file: Path, kind: str, load: Callable[[str], Any], text: str) -> Any:
@@ -287,14 +286,10 @@ def _blank(found: re.Match[str]) -> str:
     return re.sub(r"[^\n]", " " if part.startswith("#") else "_", part)
 
 
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _once(text: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     table = dict(pairs)
     if len(table) < len(pairs):
-        counts = Counter(name for name, _ in pairs)
-        raise ValueError(
-            f"the key {shown(min(name for name, count in counts.items() if count > 1))} is given"
-            " twice"
-        )
+        raise ValueError(f"{key_again(text)} is given twice")
     return table
 
 

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from ...doors import offers
@@ -35,7 +36,7 @@ def place(file: Path, key: str) -> str:
 
     The line is that of the closest table around it, if the file has no such key.
     """
-    kinds = {".toml": keys_of, ".json": _keys_of_json}
+    kinds = {".toml": keys_of, ".json": partial(keys_of, value="")}
     kinds |= {suffix: each.load() for suffix, each in offers("lines").items()}
     read, line = kinds.get(file.suffix.lower()), 0
     if read and key:
@@ -121,5 +122,11 @@ def _name(token: str) -> str:
     return token
 
 
-def _keys_of_json(text: str) -> Iterator[tuple[str, int]]:
-    return keys_of(text, "")
+def key_again(text: str) -> str:
+    """Return the first key of JSON that stands again, with its line."""
+    seen = set[str]()
+    for path, line in keys_of(text[:LONGEST], ""):
+        if path in seen and path[-1] != "]":
+            return f"line {line}: the key {path!r}"
+        seen.add(path)
+    return "a key"

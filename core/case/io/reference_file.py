@@ -25,7 +25,7 @@ SAME_GRID = 1e-12
 _DECIMAL = re.compile(r"[-+]?\d++(?:\.\d*+)?(?:[eE][-+]?\d++)?", re.ASCII)
 
 
-class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True):
+class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One output, SI, as decimals; null if a sample is not proved, or has no value of the output.
 
     Attributes:
@@ -44,7 +44,9 @@ class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True):
     reason: str | None = None
 
 
-class Sample(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Sample(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
+):
     """Proof of a sample, or the reason for a missing proof.
 
     Attributes:
@@ -68,7 +70,7 @@ class Sample(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     left_out: list[str] | None = None
 
 
-class Reference(msgspec.Struct, frozen=True, kw_only=True):
+class Reference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A proved reference.
 
     Attributes:

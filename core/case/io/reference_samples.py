@@ -13,9 +13,9 @@ import math
 import re
 from array import array
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +67,7 @@ class Samples:
         printed: digits of the numbers, by column.
         table: the table that they are from, with the driver values in its column `first`.
         signs: sign convention named in a comment.
-        left_out: rows without numbers below the head.
+        left_out: comments, titles above the head, and rows without numbers below it.
     """
 
     file: Path
@@ -92,7 +92,7 @@ class Samples:
         return next(str(cells[self.first]) for place, cells in rows if place == self.places[k])
 
 
-def read_table(file: Path, sheet: str | None, option: str, above: str = "") -> Table:
+def read_table(file: Path, sheet: str | None, option: str, above: str | None = None) -> Table:
     """Read the table of a reference or a recording.
 
     Args:
@@ -117,9 +117,8 @@ def read_table(file: Path, sheet: str | None, option: str, above: str = "") -> T
             f"found {len(lines)} lines, expected a row for each sample of the sweep; thin out the"
             " samples",
         )
-    if above:
-        last = next((k for k, line in enumerate(lines, 1) if line.strip().lower() == above), 0)
-        lines[:last] = [""] * last
+    last = next((k for k, line in enumerate(lines, 1) if line.strip().lower() == above), 0)
+    lines[:last] = [""] * last
     return text_table(file, lines, ("#",), _delimiter)
 
 
@@ -232,19 +231,20 @@ def samples_of(
     """
     file, layout = table.file, layout_of(table)
     names = layout.heads
-    every = wanted is None or [*wanted] == [*range(len(names))]
     wanted = range(len(names)) if wanted is None else wanted
+    every = [*wanted] == [*range(len(names))]
     sign = "." if table.delimiter == "," else _decimal_sign(table, layout, wanted)
-    places, numbers, left_out = list[str](), array("d"), list[str]()
+    places, numbers, left_out = list[str](), array("d"), [*_above(table, layout)]
     printed = [Printed() for _ in wanted]
     for place, cells in islice(table.rows(), layout.body, None):
         cells = trim(cells)
         first = cells[wanted[0]] if wanted[0] < len(cells) else ""
-        if remarks and not is_number(first) and _is_remark(file, place, cells, layout):
-            left_out.append(f"{place} ({brief(', '.join(map(str, filter(None, cells))))})")
+        is_remark = remarks and not is_number(first) and _is_remark(file, place, cells, layout)
+        if is_remark or not (every or any(cells[n] != "" for n in wanted if n < len(cells))):
+            left_out.append(_shown_row(place, cells))
             continue
-        if not every and not any(cells[n] != "" for n in wanted if n < len(cells)):
-            continue  # a note
+        if beside := cells[len(names) :]:
+            left_out.append(_shown_row(place, beside))
         if gaps:
             cells = [*cells, *[""] * (len(names) - len(cells))]
         width = len(cells)
@@ -277,6 +277,18 @@ def samples_of(
         np.array(numbers).reshape(len(places), len(wanted)),
         *(printed, table, wanted[0], signs, left_out),
     )
+
+
+def _above(table: Table, layout: Layout) -> Iterator[str]:
+    """Yield comments, and rows above the head that name no groups of columns."""
+    yield from (brief(text) for text in table.comments if not _SIGNS.match(text))
+    for place, cells in takewhile(lambda row: row[0] != layout.where, table.rows()):
+        if not any(head.startswith(str(cells[0])) for head in layout.heads):
+            yield _shown_row(place, cells)
+
+
+def _shown_row(place: str, cells: Sequence[Cell]) -> str:
+    return f"{place} ({brief(', '.join(map(str, filter(None, cells))))})"
 
 
 def _is_remark(file: Path, place: str, cells: Sequence[Cell], layout: Layout) -> bool:

@@ -37,10 +37,10 @@ def write_csv(path: Path, columns: Mapping[str, Kind], chunks: Iterable[Rows]) -
         return put_csv(file, columns, chunks)
 
 
-def csv_text(columns: Iterable[str], rows: Rows) -> str:
-    """Return a table as the text of a CSV file with plain line ends."""
+def csv_text(columns: Mapping[str, Kind], chunks: Iterable[Rows], end: str = "\r\n") -> str:
+    """Return a table as the text of a CSV file."""
     text = io.StringIO()
-    put_csv(text, dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
+    put_csv(text, columns, chunks, end)
     return text.getvalue()
 
 

@@ -440,7 +440,7 @@ def _undriven_error(
     if not count:
         problem = "nothing moves: joints lock all parts, or motions stand still"
         return fault(model.dataset.file, "", f"{problem}; free a part, or add a MOTION")
-    named = [f"of the joints {shortened([*rest], _MOST_NAMED)}"] if rest else []
+    named = [f"of the joints {shortened(rest, _MOST_NAMED)}"] if rest else []
     if left:
         named.append(f"{left} of {_bodies(mechanism)} that no joint's coordinate drives")
     advice = [f"--drive {rest[0]}:START:STOP [rad, m]"] if rest and not moving else []

@@ -126,7 +126,7 @@ def _combinations(found: Fitted) -> Section:
     verdict += [f"{len(every) - len(told)} are known by the drawing alone, and not listed."]
     verdict += [f"No effect on what was measured: {each}." for each in found.null]
     if found.idle:
-        verdict.append(f"Left out, nothing measured follows: {shortened([*found.idle], 6)}.")
+        verdict.append(f"Left out, nothing measured follows: {shortened(found.idle, 6)}.")
     heads = ["", "combination", f"moved [{unit.name}]", "±", "± by the drawing", "source"]
     title = "Combinations of moves"
     diagram = Diagram(plot, {"data": [bars], "layout": layout}, [style])

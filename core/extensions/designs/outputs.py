@@ -7,7 +7,7 @@ added here: turns of angles, signs of Euler parameters, and samples at rest.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -145,15 +145,15 @@ def equation_of(output: Any) -> Any:
     programs: tolerances, and a radius beside the point that it leads to.
     """
     kept = dict[str, Any]()
-    for each in fields(output):
-        value = getattr(output, each.name)
-        if each.name in ("atol", "rtol", "why"):
-            kept[each.name] = type(value)()
-        elif each.name == "of_output":
-            kept[each.name] = equation_of(value)
+    for name in getattr(output, "__dataclass_fields__", ()):  # of the user's, perhaps none
+        value = getattr(output, name)
+        if name in ("atol", "rtol", "why"):
+            kept[name] = type(value)()
+        elif name == "of_output":
+            kept[name] = equation_of(value)
         elif getattr(value, "wheel_contact", None) is not None:
-            kept[each.name] = replace(value, wheel_radius=1.0)
-    return replace(output, **kept)
+            kept[name] = replace(value, wheel_radius=1.0)
+    return replace(output, **kept) if kept else output
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,7 +48,12 @@ class HardpointReader(Reader):
             except OpenError as other:
                 if other is error:
                     raise
-                raise error.with_others(other) from None
+                raise OpenError(  # one question of two
+                    file,
+                    [*error.why, *other.why],
+                    {**error.stated, **other.stated},
+                    {**error.writes, **other.writes},
+                ) from None
             except CaseError:
                 pass
             raise

@@ -278,14 +278,14 @@ def _notes(
     """Return what the user should know of how a curve was read."""
     read = ", ".join(f"{name} [{unit}]" for name, unit in origin.units.items())
     notes = [f"{file}: read {read}"]
-    if left_out:
-        listed = shortened([brief(shown(head)) for head in left_out], MOST_NAMED)
-        notes.append(f"{file}: left out the columns {listed}")
-    if rows:
-        notes.append(f"{file}: left out the rows {shortened([*rows], MOST_NAMED)}")
-    if bare:
-        listed = shortened([brief(shown(head)) for head in bare], MOST_NAMED)
-        notes.append(f"{file}: without a unit, taken in SI units: {listed}")
+    columns, units = ([brief(shown(head)) for head in heads] for heads in (left_out, bare))
+    for told, found in (
+        ("left out the columns", columns),
+        ("left out the rows", rows),
+        ("without a unit, taken in SI units:", units),
+    ):
+        if found:
+            notes.append(f"{file}: {told} {shortened(found, MOST_NAMED)}")
     if assumed:
         notes.append(
             f"{file}: names no convention of signs, {assumed} is assumed; state it: --signs"

@@ -283,11 +283,12 @@ def read_recording(
 
 
 def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
-    opensim, notes = file.suffix.lower() in _OPENSIM, list[str]()
-    if file.suffix.lower() in JSON and sheet is None:
+    suffix, notes = file.suffix.lower(), list[str]()
+    opensim = suffix in _OPENSIM
+    if suffix in JSON and sheet is None:
         table, notes = table_of_json(file, LARGEST_FILE, LESS)
     else:
-        table = read_table(file, sheet, "--sheet NAME", _END if opensim else "")
+        table = read_table(file, sheet, "--sheet NAME", _END)
     table = _wide_table(table)
     layout = layout_of(table)
     chosen = choose([Head(*unit_of_head(file, layout.where, text)) for text in layout.heads])
@@ -296,15 +297,17 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     for k, values, printed, text in zip(
         chosen, samples.numbers.T, samples.printed, samples.columns, strict=True
     ):
-        head = Head(*unit_of_head(file, layout.where, text))  # with the unit of a row of units
-        columns[k] = Column(head, values, printed.half(np.nan_to_num(values), alone=True))
-    rows = shortened(samples.left_out, MOST_NAMED)
-    notes += [f"{file}: left out the rows without numbers: {rows}"] if rows else []
-    if not opensim:
-        return Recording(file, columns, notes=notes)
-    stated = _DEGREES.search(read_text(file, LARGEST_FILE, LESS))
+        columns[k] = Column(
+            # the text has the unit of a row of units
+            Head(*unit_of_head(file, layout.where, text)),
+            values,
+            printed.half(np.nan_to_num(values), alone=True),
+        )
+    if rows := shortened(samples.left_out, MOST_NAMED):
+        notes.append(f"{file}: left out the rows without samples: {rows}")
+    stated = _DEGREES.search(read_text(file, LARGEST_FILE, LESS)) if opensim else None
     if stated is None:
-        return Recording(file, columns, "OpenSim", notes=notes)
+        return Recording(file, columns, "OpenSim" * opensim, notes=notes)
     angle = "deg" if stated[1].lower() == "yes" else "rad"
     note = f"{file}: angles without a unit in {angle}, as its head says"
     return Recording(file, columns, "OpenSim", angle, [note, *notes])

@@ -137,8 +137,10 @@ def _notes_on_columns(recording: Recording, meaning: Meaning) -> Iterator[str]:
             text = f"column {head.name} is taken in {unit}, as stated, and not in {head.unit}"
             yield f"{recording.file}: {text}"
     if meaning.unknown:
-        listed = shortened([*meaning.unknown], MOST_NAMED)
-        yield f"{recording.file}: columns of no known name are left out: {listed}"
+        yield (
+            f"{recording.file}: columns of no known name are left out:"
+            f" {shortened(meaning.unknown, MOST_NAMED)}"
+        )
     if bare:
         units = " and ".join(dict.fromkeys(bare.values()))
         names = shortened([*bare], MOST_NAMED)

@@ -8,7 +8,7 @@ from typing import Any, TextIO
 from rich.console import Console
 from rich.text import Text
 
-from ...case.io.table_file import csv_text
+from ...case.io.table_file import Kind, csv_text
 from ...errors import labelled, number_of, shortened
 from ...harness.labels import notes, number
 from ...report import terminal
@@ -281,7 +281,7 @@ def envelope_csv(results: SweepResults) -> str:
         for k, value in enumerate(scale_values(driver_scale, results.driver[swept])):
             found = (column[k] for column in numbers)
             rows.append([name, unit, k, value, driver_unit, *found, *partial])
-    return csv_text(columns, rows)
+    return csv_text(dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
 
 
 def gradient_csv(results: SweepResults) -> str:
@@ -300,7 +300,7 @@ def gradient_csv(results: SweepResults) -> str:
                 *(factor * each.scale, its, factor * each.deviation, scale * effect(each), unit),
             ]
         )
-    return csv_text(columns, rows)
+    return csv_text(dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
 
 
 def limits_csv(results: SweepResults) -> str:
@@ -318,7 +318,7 @@ def limits_csv(results: SweepResults) -> str:
         name = each.output or "all"
         shares = (each.share_of_all, each.share_of_complete)
         rows.append([name, unit, *limits, *counts, each.share, *interval, *shares, *indices])
-    return csv_text(columns, rows)
+    return csv_text(dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
 
 
 def scale_values(scale: float, values: Iterable[float | None]) -> list[float | None]:

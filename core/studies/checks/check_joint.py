@@ -228,9 +228,9 @@ def _random(joint_class: type[Joint], rng: np.random.Generator) -> Joint:
 
 def _value(field: Field[Any], rng: np.random.Generator, angle: float) -> Any:
     centre = rng.uniform(-4.0 * SIZE, 4.0 * SIZE, 3)
-    ends = [centre, centre + SIZE * _unit(rng.normal(size=3))]
-    a, other = _unit(rng.normal(size=3)), rng.normal(size=3)
-    b = math.cos(angle) * a + math.sin(angle) * _unit(other - (a @ other) * a)
+    ends = [centre, centre + SIZE * unit_vector(rng.normal(size=3))]
+    a, other = unit_vector(rng.normal(size=3)), rng.normal(size=3)
+    b = math.cos(angle) * a + math.sin(angle) * unit_vector(other - (a @ other) * a)
     # directions may have any length
     stretch = rng.uniform(0.5, 2.0, 2)
     makers: Mapping[Kind, Callable[[], Any]] = {
@@ -262,7 +262,8 @@ def between_test_bodies(joint: Joint) -> Joint:
     return replace(joint, i=BODIES[0], j=BODIES[1], **joint.mapped({Kind.POSITION: _snap_to_grid}))
 
 
-def _unit(a: Array) -> Array:
+def unit_vector(a: Array) -> Array:
+    """Return the direction of a vector in doubles."""
     return np.asarray(a / np.linalg.norm(a))
 
 

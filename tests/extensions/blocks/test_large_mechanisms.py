@@ -20,7 +20,6 @@ from kincheck.core import (
     Screw,
     SolveError,
     Spherical,
-    Table,
     Translational,
     Universal,
     solve,
@@ -41,6 +40,7 @@ from kincheck.core.mechanism.motions import Path, Ramp
 
 from ...report.page import report
 from ...support.block_structures import chain_of_hinges, solve_sparse
+from ...support.fakes import calls
 from ...support.mechanisms import (
     ORIGIN,
     X,
@@ -49,6 +49,7 @@ from ...support.mechanisms import (
     circles_meet,
     crank_tip,
     errors,
+    indexed,
     indexing,
     planar_four_bar,
     solve_all,
@@ -433,13 +434,6 @@ def test_slopes_fall_lane_by_lane():
         np.testing.assert_array_equal(after[:, k], slope)
 
 
-def indexed(turns):
-    """The turns between time zero and one, and rest before and after."""
-    rest = np.arange(-40.0, 41.0) * 0.01
-    values = np.repeat([0.0, 2.0 * np.pi * turns], len(rest))
-    return Table(tuple(np.concatenate([rest, 1.0 + rest])), tuple(values))
-
-
 @pytest.mark.parametrize(
     ("cranks", "turns", "count"), [(9, 1, 2), (9, -4, 11), (22, -2, 2), (22, 1, 11)]
 )
@@ -465,15 +459,6 @@ def test_ring_counts_turns_between_samples(cranks, turns, count):
     found = solve_all(mechanism, "clock", values, rate=last, motions={"index": indexed(turns)})
     assert ("factor_entries" in found.details) == (cranks == 22)
     assert found.points["mark"].position[-1] == pytest.approx([0.2, 0.0, lead * turns], abs=1e-14)
-
-
-def calls(monkeypatch, owner, name):
-    """The arguments of all calls from now on."""
-    every, call = [], getattr(owner, name)
-    monkeypatch.setattr(
-        owner, name, lambda *given, **named: (every.append(given), call(*given, **named))[1]
-    )
-    return every
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,9 @@ from kincheck.core import (
 )
 from kincheck.core.extensions.designs import design_batch
 from kincheck.core.extensions.designs.design_batch import solve_variants
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
+from kincheck.core.extensions.sweep.curves import curves
+from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled.compiled_model import compile_model, recent_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
@@ -368,3 +371,16 @@ def test_open_variant_is_refused():
     found = solve_variants(route, np.array([[0.32, 0.05]]), TOL)
     assert found.solved.all(axis=0).tolist() == [True, False]
     assert found.messages[1].startswith("does not close at its design position; check")
+
+
+def test_tables_of_a_template_share_programs(tmp_path, monkeypatch):
+    """Of other numbers, for curves by other places."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    traced, trace, file = [], compiled_model._trace, tmp_path / "car.csv"
+    monkeypatch.setattr(compiled_model, "_trace", lambda *x: traced.append(x) or trace(*x))
+    text = sample_table(TEMPLATES["double_wishbone"])
+    for k, place in enumerate(("lca_front x", "tierod_inner z")):
+        file.write_text(text.replace("front,90", f"front,9{k}"))
+        curves(file, [place], [[0.0]], ["toe.per_travel"])
+    assert "front,91" in file.read_text()
+    assert len(traced) == 1

@@ -13,7 +13,7 @@ from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 
-from ...support.case_texts import complains, rows, write
+from ...support.case_texts import complains, line_with, rows, write
 from .test_hardpoint_dialects import POINTS, comma, table
 from .test_workbooks import book
 
@@ -271,11 +271,6 @@ def test_german_names_of_curves(tmp_path):
     found, notes = with_curve(case, curve, CurveOptions())
     assert {*found.reference} == {"toe", "camber"}
     assert "read stroke [mm], toe [deg, column 'Vorspur [°]'], camber" in notes[0]
-
-
-def line_with(text, number):
-    (line,) = (k for k, line in enumerate(text.splitlines(), 1) if str(number) in line)
-    return line
 
 
 @pytest.mark.parametrize("ending", ["json", "yaml"])

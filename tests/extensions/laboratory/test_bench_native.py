@@ -80,7 +80,7 @@ def test_loops_alone_solve_every_sample():
 
 def test_flops_per_sample():
     size = precision.program_size(cases.load("rssr"))
-    once, twice = (size.of_sample(n) for n in (1.0, 2.0))
+    once, twice = (precision.flops_of_sample(size, n) for n in (1.0, 2.0))
     assert twice - once == size.flops["newton"]
     assert once == sum(
         size.flops[name] for name in ("extrapolate", "newton", "outputs", "joined_gaps", "joined")

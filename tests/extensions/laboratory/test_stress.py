@@ -13,9 +13,7 @@ from kincheck.adapters import engine
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.caches import clear_caches
-from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.case_file import case_text, load_case
-from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.errors import KincheckError, SolveError
 from kincheck.core.extensions.laboratory.stress.families import FAMILIES, Family, Specimen
 from kincheck.core.extensions.laboratory.stress.families.base import as_case
@@ -43,11 +41,10 @@ from kincheck.core.harness.execution import Answer, Failure, Pair
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
 from kincheck.core.joints.base import AxialJoint, unit
-from kincheck.core.mechanism.mechanism import Mechanism
 
 from ...support.engine_faults import changed
 from ...support.fakes import Fake, native_but, raising
-from ...support.loaded_slider_crank import GRAVITY, loaded
+from ...support.loaded_slider_crank import GRAVITY, case_of, loaded
 
 NATIVE = engine("native")
 # Of a family whose specimens are of one kind, few show it.
@@ -485,13 +482,6 @@ def test_reduced_case_keeps_relevant_parts():
         ("crank_pin", (1.0, 0.0, 0.0))
     ]
     assert [each.name for each in found.outputs] == ["crank_pin_y"]
-
-
-def case_of(mechanism: Mechanism) -> Case:
-    sweep = Sweep(mechanism.drivers[0].name, np.linspace(0.0, 0.25, 3))
-    return with_all_coordinates(
-        Case(mechanism.name, "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    )
 
 
 def test_reduction_drops_loads_of_removed_parts():

@@ -20,7 +20,7 @@ from kincheck.core.kinematics.forces import equations
 from kincheck.core.mechanism.mechanism import Mechanism
 from kincheck.core.mechanism.motions import Path, Ramp
 
-from ...support.driven_chains import COUPLINGS, Link, chain
+from ...support.driven_chains import COUPLINGS, Link, at_origins, chain
 from ...support.loaded_slider_crank import loaded, pushed
 
 flint = pytest.importorskip("flint")
@@ -187,13 +187,6 @@ def off_by_hand(made):
             found = np.array([float(each) for each in balls])
             off, size = max(off, np.abs(found - numbers).max()), max(size, np.abs(found).max())
     return off / size
-
-
-def at_origins(self, freedom, i, j):
-    """Slides between the internal origins of the bodies, not at the joint's point."""
-    P, h = vec(self.point), unit(self.axis)
-    between = p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
-    return between if freedom == "translation" else p.DrivenAngle(h)
 
 
 @pytest.mark.parametrize(

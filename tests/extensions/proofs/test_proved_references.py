@@ -109,6 +109,7 @@ def test_unproved_sample_is_nan(made):
         ),
         ({"outputs": {}}, "outputs: found none, expected outputs of the case"),
         ({"schema": "kincheck-results/1"}, "expected a proved reference"),
+        ({"zq_unknown": 1}, "unknown field `zq_unknown`, expected a proved reference"),
     ],
     ids=str,
 )

@@ -181,6 +181,17 @@ def test_unknown_columns_are_named(recorded):
     )
 
 
+def test_lines_beside_samples_are_listed(recorded):
+    turn = GRIDS["even"]
+    text = text_of(digits(8), turn, *closed_form(turn))
+    status, record = recorded(f"# units: inch\nRig, 4711\n{text}end of test\n# signs")
+    assert status == 0
+    assert (
+        "left out the rows without samples: # units: inch, # signs, line 2 (Rig, 4711),"
+        " line 25 (end of test)"
+    ) in record["message"]
+
+
 def poses(turn, length=1.0, form=None):
     """Return a table of the rod's poses, its quaternions of another length."""
     place, _ = closed_form(turn)
@@ -347,8 +358,3 @@ def test_other_json_is_refused(recorded, capsys, kind):
     value, told = REFUSED[kind]
     assert recorded(json.dumps(value), name="run.json")[0] == 2
     assert told in capsys.readouterr().err
-
-
-def test_key_of_json_twice(recorded, capsys):
-    assert recorded('{"turn": [0], "turn": [1]}', name="run.json")[0] == 2
-    assert "the key 'turn' is given twice" in capsys.readouterr().err

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import CaseError
-from kincheck.core.cli.lists import schema_of
 from kincheck.core.extensions.sweep.variation import Law
 from kincheck.core.extensions.sweep.variation_file import read_variation
 
-from ...support.case_texts import rows, write
+from ...support.case_texts import rows, validator, write
 from ...support.fakes import crank
 from ...support.variations import HEAD, moved, vary
 
@@ -242,15 +241,6 @@ def test_variation_is_named_with_line(tmp_path):
     text = 'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.tip]\nsigmma = 1\n'
     with pytest.raises(CaseError, match=r"vary\.toml: line 4: hardpoints\.tip\.sigmma: "):
         read_variation(write(tmp_path, text, "vary.toml"), crank())
-
-
-jsonschema = pytest.importorskip("jsonschema")
-
-
-def validator(name):
-    schema = schema_of(name)
-    jsonschema.Draft202012Validator.check_schema(schema)
-    return jsonschema.Draft202012Validator(schema)
 
 
 def test_variation_schema():

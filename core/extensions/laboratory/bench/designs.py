@@ -25,6 +25,7 @@ from ...designs.design_batch import Variants
 from ...designs.prepared import PreparedDesigns, prepare_designs
 from ...sweep.sweep import sweep_designs
 from ...sweep.variation import Coordinate, Law, Mode, Variation
+from .precision import flops_of_sample
 from .rounds import Peak, Spread, Work, spread, take_turns
 
 SIZES = (1, 4, 16, 64, 256, 1024, 4096)
@@ -84,7 +85,7 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
         model = designs.route.model
         taken: list[float] = found.kept[model.rows[ITERATIONS].start][found.solved].tolist()
         iterations = statistics.fmean(taken) if taken else 0.0
-        flops = ProgramSize.of(model).of_sample(iterations, motions=True)
+        flops = flops_of_sample(ProgramSize.of(model), iterations, motions=True)
         rate = flops * reached / seconds[count].median
         rows.append(
             Batch(

@@ -33,6 +33,7 @@ from .precision import (
     contestants,
     fastest_efforts,
     floors,
+    flops_of_sample,
     levels,
     loops_alone,
     measure_loops,
@@ -223,7 +224,7 @@ def _rates(case: Case, native: Mapping[str, Entry], peak: Peak, seconds: Spread)
     for setting in (EVERYTHING, ALONE):
         entry = native.get(setting)
         if entry is not None and entry.us_per_sample is not None:
-            flops = program_size(case).of_sample(entry.iterations or 0.0)
+            flops = flops_of_sample(program_size(case), entry.iterations or 0.0)
             us = entry.us_per_sample.median
             found.append((f"one sweep, {setting}", us, flops, 1e-3 * flops / us))
     return [

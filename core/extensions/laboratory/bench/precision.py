@@ -21,6 +21,7 @@ from ....harness.native_engine import NativeEngine
 from ....harness.record import Outcome, Record
 from ....harness.run import run
 from ....kinematics import Method, NativeSolver, ProgramSize
+from ....kinematics.compiled import step_programs
 from ....kinematics.compiled.compiled_model import compile_model
 from ....kinematics.compiled.routes import Route
 from ....kinematics.continuation.walk import marcher
@@ -380,3 +381,18 @@ def program_size(case: Case) -> ProgramSize:
     return whole.solver.program_size(
         case.mechanism, case.sweep.path, case.points, whole.bodies(case)
     )
+
+
+def flops_of_sample(size: ProgramSize, iterations: float, *, motions: bool = False) -> float:
+    """Return the floating-point operations of a sample: predictor, Newton's iterations, rates,
+    outputs and the test of a solution.
+
+    Operations of rejected lanes, and further iterations for a neighbour's sake, do not count.
+
+    Args:
+        iterations: Newton's iterations of the sample.
+        motions: lanes are motions of their own, of varied geometry, and not samples of one motion;
+            the first few samples of a motion use other programs.
+    """
+    tests = ("extend", *step_programs.ALONE) if motions else ("extrapolate", *step_programs.JOINED)
+    return iterations * size.flops["newton"] + sum(size.flops[x] for x in ("outputs", *tests))

@@ -17,6 +17,7 @@ from .....failures import FailureKind
 from .....joints import Joint
 from .....mechanism.mechanism import Mechanism
 from .....mechanism.motions import Driver, JointAngle, JointDisplacement, JointDriver, Motion
+from .....studies.checks.check_joint import unit_vector
 from .....trajectory import Array
 from ...truth.motion import Motion as ClosedForm
 from ...truth.motion import Truth as Known
@@ -152,11 +153,6 @@ def own_drivers(joint: Joint) -> list[Driver]:
 def direction(rng: Rng) -> Array:
     """Return a random unit vector."""
     return unit_vector(rng.normal(size=3))
-
-
-def unit_vector(a: Array) -> Array:
-    """Return the direction of a vector in doubles."""
-    return np.asarray(a / np.linalg.norm(a))
 
 
 def power(rng: Rng, low: float, high: float) -> float:
