@@ -1,8 +1,6 @@
 """Families of stress runs, the native engine in them, and verdicts on motions and forces."""
 
 import importlib
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -496,9 +494,3 @@ def test_reduction_drops_loads_of_removed_parts():
     assert [each.name for each in small.mechanism.moving] == ["crank"]
     assert small.mechanism.body("crank").mass == 2.0
     assert small.mechanism.gravity == GRAVITY
-
-
-def test_margin_left_out():
-    words = "-m kincheck.core.extensions.laboratory.stress.margins closed --family tolerances"
-    words += " --samples 12 --no-proofs --quiet"
-    assert subprocess.run([sys.executable, *words.split()], check=False).returncode == 1
