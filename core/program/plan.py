@@ -98,8 +98,8 @@ class Plan:
 
     def fixed_from(self, slots: Sequence[int]) -> list[tuple[int, int]]:
         """Return positions of carried slots among these, and of their targets in `fixed`."""
-        place = {slot: k for k, slot in enumerate(self.fixed)}
-        return [(slots.index(a), place[b]) for a, b in self.carried if a in slots and b in place]
+        found, place = ({slot: k for k, slot in enumerate(each)} for each in (slots, self.fixed))
+        return [(found[a], place[b]) for a, b in self.carried if a in found and b in place]
 
     @property
     def moves(self) -> Sequence[tuple[int, int]]:

@@ -30,7 +30,7 @@ from ...kinematics.compiled.request import (
 )
 from ...kinematics.compiled.solution import Columns
 from ...kinematics.continuation.singular_poses import SOUND, Anchor, Numbers
-from ...kinematics.formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
+from ...kinematics.formulation.acceptance_criteria import EPSILON
 from ...kinematics.formulation.constraints import frames
 from ...kinematics.formulation.state_vectors import samples
 from ...kinematics.structure.degrees_of_freedom import freedom_account
@@ -43,7 +43,7 @@ from ..llvm.plan import aligned
 from .components import Alike, components, describe_components
 from .numbers_of import structure
 from .sparse_lanes import SparseLanes
-from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
+from .sweep import CERTAIN, CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,14 +306,15 @@ class ComponentLanes(Lanes):
             call(-1, groups)
         return self.worst[MARGINS, :count].copy()
 
-    def walk(self, tables: Sequence[Array], count: int) -> tuple[Array, Array]:
+    def walk(
+        self, tables: Sequence[Array], count: int, certain: float = CERTAIN
+    ) -> tuple[Array, Array]:
         """See `Lanes`."""
         if self._walk is None:
-            return super().walk(tables, count)
+            return super().walk(tables, count, certain)
         samples = [tables[k] for k in self._which]
-        # `is_uncertain` in reverse; for sure, not by rounding either
-        bound = (1.0 - 1e-12) * AMPLIFIED * self._tol / WORSE
-        moving, tests = self._walk(samples, count, (EPSILON, bound))
+        moving, tests = self._walk(samples, count, (EPSILON, certain * self._tol))
+        self.refused = not self.worst[MARGINS, 0] > 0.0
         return self._motions(moving), tests
 
     def motions(self, count: int) -> Array:

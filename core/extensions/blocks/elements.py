@@ -9,7 +9,7 @@ are constants of its program; others are read from slots of their own.
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -27,9 +27,9 @@ from ...kinematics.formulation.styles import NATIVE
 from ...program import Plan, Program, Tape, Traced, program
 from ...program.executor import Bind
 from ..llvm.bytecode import Bytecode, bytecode, repeated
-from ..llvm.compiler import vector_width
 from ..llvm.executor import LlvmExecutor
 from ..llvm.jit import LlvmCode
+from .fixed_order import LANES
 from .numbers_of import coordinates_of, renamed, structure, with_numbers
 
 Indices = NDArray[np.intp]
@@ -41,22 +41,30 @@ AFTER = "after "
 class LargeSystem(System):
     """A system in machine code: interpreted, because it takes longer to compile so many operations
     than they ever run. Joints of the library in the native style are elements.
+
+    Attributes:
+        tables: of elements; None of other equations.
+        stride: slots of a lane, with those of intermediate values.
     """
+
+    tables: Mapping[str, Bytecode] | None
 
     def ready(self, outputs: Program) -> tuple[Plan, Bind]:
         """See `System`."""
         tracer, tables = self.tracer, None
         if tracer.request.style == NATIVE and is_builtin(tracer.mechanism):
-            found, self.after = Elements(tracer.formulation, tracer.layout, vector_width()), AFTER
+            found, self.after = Elements(tracer.formulation, tracer.layout, LANES), AFTER
             self.rows, self.columns, self.sizes = found.rows, found.columns, {**found.sizes}
             self.geometry = found.geometry[:, None]
-            last = bytecode(outputs, len(tracer.layout.slots), vector_width())
+            last = bytecode(outputs, len(tracer.layout.slots), LANES)
             tables = {**found.tables, outputs.name: last}
             programs = {name: Program(name, (), {}) for name in found.tables}
             plan = Plan({**programs, outputs.name: outputs}, tracer.layout.slots)
         else:
             plan, _ = super().ready(outputs)
-        return plan, partial(LlvmExecutor, LlvmCode(plan, often=math.inf, tables=tables))
+        code = LlvmCode(plan, often=math.inf, tables=tables, width=LANES)
+        self.tables, self.stride = tables, code.stride
+        return plan, partial(LlvmExecutor, code)
 
 
 class _Member(NamedTuple):

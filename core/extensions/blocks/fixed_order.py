@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from functools import cache, partial
 from heapq import heapify, heappop, heappush
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...trajectory import Array
 from ..llvm.jit import Code, load
-from ..llvm.plan import BYTES, LINE, address, aligned
+from ..llvm.plan import BYTES, LINE, address, aligned, call, each_row, fields_of
 from ..llvm.programs import Lines, declarations
 
 LANES = LINE
@@ -58,7 +59,7 @@ class FixedOrder:
         numbers = np.split(room, np.cumsum(counts)[:-1])
         self._given, _, _, _, (self.growth, self.inverse, self._signs), ones = numbers
         self._given[-1], ones[:] = 0.0, 1.0
-        self._alive = starts, pivots, every, sources, pivots + 1, room
+        self._sources, self._alive = sources, (starts, pivots, every, sources, pivots + 1, room)
         at = [address(each) for each in self._alive[:5]]
         at_numbers = [address(each) for each in numbers]
         self._factor = partial(load_loops().calls["factor"], n, *at[:4], *at_numbers[:5])
@@ -67,6 +68,7 @@ class FixedOrder:
         table = at[2], at_numbers[1]
         self._lower = at[0], at[1], *table, at_numbers[5]
         self._upper = at[4], at[0] + BYTES, *table, at_numbers[2]
+        self._places, self._numbers = at[:3], at_numbers[1:4]
 
     def factor(self, numbers: Array) -> None:
         """Factor matrices with these numbers, shape (numbers, LANES)."""
@@ -77,20 +79,46 @@ class FixedOrder:
         """Return solutions, of the matrices or of the transposed ones, shape (n, LANES)."""
         found = aligned(b.size).reshape(b.shape)
         found[:] = b
-        name, first, last = (
-            ("scatter", self._upper, self._lower)
-            if transposed
-            else ("gather", self._lower, self._upper)
-        )
+        name, first, last = self._sweeps(transposed=transposed)
         run, n, there = load_loops().calls[name], self.n, address(found)
         run(n, 0, 1, *first, there)
         run(n, n - 1, -1, *last, there)
         return found
 
+    def _sweeps(self, *, transposed: bool) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
+        """Return the name of the loop of a solution, and its tables on the way down and up."""
+        if transposed:
+            return "scatter", self._upper, self._lower
+        return "gather", self._lower, self._upper
+
+    def factoring(self, slots: NDArray[np.intp], out: NDArray[np.intp]) -> list[NDArray[np.int64]]:
+        """Return the table of `factor_lanes`, and its arrays. One straying matrix is reason to look
+        at all of them: each has the largest growth and inverse of all.
+
+        Args:
+            slots: of the numbers of a matrix, and of zero.
+            out: first of three slots, see `growth`, `inverse` and `odd`.
+        """
+        sources = slots[np.append(self._taken, len(slots) - 1)][self._sources].astype(np.int64)
+        fields = self.n, *self._places, address(sources), *self._numbers, *out
+        return [np.array(fields, np.int64), sources]
+
+    def solving(
+        self, given: NDArray[np.intp], found: NDArray[np.intp], *, transposed: bool
+    ) -> list[NDArray[Any]]:
+        """Return the table of `solve_lanes`, and its arrays; the slots of right-hand sides and
+        solutions are in the order of elimination.
+        """
+        name, first, last = self._sweeps(transposed=transposed)
+        work, places = aligned(self.n * LANES), [x.astype(np.int64) for x in (given, found)]
+        at = [address(each) for each in (work, *places)]
+        fields = self.n, load_loops().address(name), *first, *last, *at
+        return [np.array(fields, np.int64), work, *places]
+
     @property
     def odd(self) -> NDArray[np.bool_]:
         """Whether the number of negative pivots of each matrix is odd."""
-        return np.signbit(self._signs)
+        return self._signs < 0.0
 
 
 def _fill_in(rows: NDArray[np.intp], columns: NDArray[np.intp], n: int) -> list[set[int]]:
@@ -116,7 +144,8 @@ def _fill_in(rows: NDArray[np.intp], columns: NDArray[np.intp], n: int) -> list[
 @cache
 def load_loops() -> Code:
     """Return the loops, compiled if the cache has none of their text."""
-    text = "\n".join([_factor(), _sweep("gather"), _sweep("scatter"), declarations(LANES)])
+    sweeps = _sweep("gather"), _sweep("scatter")
+    text = "\n".join([_factor(), *sweeps, _in_lanes(), declarations(LANES)])
     return load(text, lambda: text, {"factor": 10, "gather": 9, "scatter": 9})
 
 
@@ -230,7 +259,9 @@ end:
 done:
   {_store("%growth_now", "%growth", "0")}
   {_store("%reciprocal_largest", "%growth", "1")}
-  {_store("%signs", "%growth", "2", WORDS)}
+  %sign = bitcast {WORDS} %signs to {VECTOR}
+  %unit = call {VECTOR} @llvm.copysign.v{LANES}f64({VECTOR} {one}, {VECTOR} %sign)
+  {_store("%unit", "%growth", "2")}
   ret void
 }}
 """
@@ -281,6 +312,120 @@ end:
   %k_more = icmp slt i64 %k_next, %n
   br i1 %k_more, label %row, label %done
 done:
+  ret void
+}}
+"""
+
+
+JOINED = {
+    "squares": f"%found = call {VECTOR} @llvm.fmuladd.v{LANES}f64({VECTOR} %value, {VECTOR} %value,"
+    f" {VECTOR} %before)",
+    "largest": _largest("value", "%before").replace("%value_largest", "%found"),
+    "least": f"%found = call {VECTOR} @llvm.minimum.v{LANES}f64({VECTOR} %before, {VECTOR} %value)",
+}
+"""Functions of lanes and a table of pairs of slots: the first of each is joined to the second. Its
+square is added, or the larger size or the smaller number taken; NaN if either is.
+"""
+
+
+def _in_lanes() -> str:
+    """Return functions of lanes and a table, see `plan.call`: a sequence of others, factors and
+    solutions of numbers in slots, the polynomial through eight lanes, and `JOINED`.
+    """
+    factoring = "ptr starts", "ptr pivots", "ptr columns", "ptr sources"
+    factors = "ptr numbers", "ptr inverse", "ptr work"
+    sweep = [f"ptr {name}" for name in ("begins", "ends", "columns", "table", "scale")]
+    first, last = ([f"{each}_{k}" for each in sweep] for k in (1, 2))
+    sweeps = (", ".join(each.replace("ptr ", "ptr %") for each in side) for side in (first, last))
+    down, up = sweeps
+    factor = f"""{fields_of("table", ["i64 n", *factoring, *factors, "i64 out"])}
+  %growth = getelementptr {VECTOR}, ptr %lane, i64 %out
+  call void @factor(i64 %n, ptr %starts, ptr %pivots, ptr %columns, ptr %sources, ptr %lane,
+    ptr %numbers, ptr %inverse, ptr %work, ptr %growth)
+  {_of_all("growth", 0)}
+  {_of_all("inverse", 1)}"""
+    tables = "ptr b", "ptr given", "ptr found"
+    solve = f"""{fields_of("table", ["i64 n", "ptr run", *first, *last, *tables])}
+  %last = sub i64 %n, 1
+  call void @bring(ptr %lane, ptr %given, i64 %n, ptr %b)
+  call void %run(i64 %n, i64 0, i64 1, {down}, ptr %b)
+  call void %run(i64 %n, i64 %last, i64 -1, {up}, ptr %b)
+  call void @take_back(ptr %lane, ptr %found, i64 %n, ptr %b)"""
+    bring = f"""{_load("slot", "%table", "%row")}
+  {_load("value", "%lane", "%slot", VECTOR)}
+  {_store("%value", "%b", "%row")}"""
+    take_back = f"""{_load("slot", "%table", "%row")}
+  {_load("value", "%b", "%row", VECTOR)}
+  {_store("%value", "%lane", "%slot")}"""
+    pair = f"""%first_row = mul i64 %row, 2
+  %second_row = add i64 %first_row, 1
+  {_load("source", "%table", "%first_row")}
+  {_load("target", "%table", "%second_row")}
+  {_load("value", "%lane", "%source", VECTOR)}"""
+    weigh = "\n  ".join(
+        f"""{_load(f"weight{k}", "%weights", str(k), VECTOR)}
+  %node{k} = shufflevector {VECTOR} %here, {VECTOR} poison, <{LANES} x i32> <{
+            ", ".join([f"i32 {k}"] * LANES)
+        }>
+  %sum{k + 1} = call {VECTOR} @llvm.fmuladd.v{LANES}f64({VECTOR} %node{k}, {VECTOR} %weight{k},
+    {VECTOR} {f"%sum{k}" if k else "zeroinitializer"})"""
+        for k in range(LANES)
+    )
+    polynomial = f"""{pair}
+  {_load("here", "%past", "%row", VECTOR)}
+  {weigh}
+  %found = select <{LANES} x i1> %known, {VECTOR} %sum{LANES}, {VECTOR} %value
+  {_store("%found", "%lane", "%target")}"""
+    goes_on = f"""{fields_of("table", ["i64 count", "ptr past", "i64 first", "i64 whether"])}
+  %rows = getelementptr i64, ptr %table, i64 4
+  %weights = getelementptr {VECTOR}, ptr %lane, i64 %first
+  {_load("flag", "%lane", "%whether", VECTOR)}
+  %known = fcmp ogt {VECTOR} %flag, zeroinitializer
+  call void @each_number(ptr %lane, ptr %rows, i64 %count, ptr %past, ptr %weights,
+    <{LANES} x i1> %known)"""
+    every = f"""{fields_of("table", ["i64 count"])}
+  %rows = getelementptr i64, ptr %table, i64 1"""
+    calls = f"""%call_at = mul i64 %row, 2
+  %call = getelementptr ptr, ptr %table, i64 %call_at
+  {call("row", "%call")}"""
+    found = [
+        each_row("bring", ", ptr %b", bring),
+        each_row("take_back", ", ptr %b", take_back),
+        each_row("each_call", "", calls),
+        each_row("each_number", f", ptr %past, ptr %weights, <{LANES} x i1> %known", polynomial),
+        _of_lanes("factor_lanes", factor),
+        _of_lanes("solve_lanes", solve),
+        _of_lanes("continue", goes_on),
+        _of_lanes(
+            "sequence",
+            f"{every}\n  call void @each_call(ptr %lane, ptr %rows, i64 %count)",
+        ),
+    ]
+    for name, line in JOINED.items():
+        body = f"""{pair}
+  {_load("before", "%lane", "%target", VECTOR)}
+  {line}
+  {_store("%found", "%lane", "%target")}"""
+        one = f"{every}\n  call void @each_{name}(ptr %lane, ptr %rows, i64 %count)"
+        found += [each_row(f"each_{name}", "", body), _of_lanes(name, one)]
+    return f"declare i64 @llvm.vector.reduce.smax.v{LANES}i64({WORDS})\n" + "\n".join(found)
+
+
+def _of_all(name: str, k: int) -> str:
+    """Return lines to give all lanes the largest of numbers without a sign, or NaN: their bits have
+    the same order.
+    """
+    return f"""{_load(f"{name}_here", "%growth", str(k), WORDS)}
+  %{name}_most = call i64 @llvm.vector.reduce.smax.v{LANES}i64({WORDS} %{name}_here)
+  %{name}_one = insertelement {WORDS} poison, i64 %{name}_most, i64 0
+  %{name}_all = shufflevector {WORDS} %{name}_one, {WORDS} poison, <{LANES} x i32> zeroinitializer
+  {_store(f"%{name}_all", "%growth", str(k), WORDS)}"""
+
+
+def _of_lanes(name: str, body: str) -> str:
+    return f"""define void @{name}(ptr %lane, ptr %table) {{
+entry:
+  {body}
   ret void
 }}
 """

@@ -8,7 +8,7 @@ matrix and the round-off of the rows depend on that size.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,84 +51,17 @@ from ...program.numpy_executor import lagrange
 from ...trajectory import Array
 from ..llvm.machine_code import works
 from .elements import LargeSystem
-from .sparse_lu import Blocks, FactorsOfLanes, Pattern, SingularError
-from .sweep import MARGINS, WORST, Indices, Lanes
+from .sparse_lu import FactorsOfLanes, Rows, SingularError
+from .sparse_walk import FARTHEST, SETTLED, STALLS, Poses, SparseWalk
+from .sweep import CERTAIN, MARGINS, WORST, Indices, Lanes
 
 POSES = 8
 """Poses evaluated together: samples that are so far from the last one are still predicted well."""
-# Residuals below this, some round-offs in rows of size one, are as small as they get; elsewhere an
-# iteration that gains less than a digit shows that they are.
-SETTLED, STALLS = 1e-15, 0.1
-FARTHEST = 1.2
-"""Largest reach of the polynomial beyond its poses, in their span: the next eight samples of an
-even sweep are 8 / 7 of it ahead.
-"""
 FEW = 5
 """Names listed in a message, at most."""
 # Steps of inverse iteration: each divides what is left of other directions by the square of how
 # much better they are determined.
 STEPS = 3
-
-
-class Rows:
-    """A choice of the rows to solve.
-
-    Args:
-        kept: the solved ones.
-        entries: of all rows at one pose; several lanes are factored in the order of that pose.
-
-    Attributes:
-        dropped: redundant rows.
-        pattern, blocks: of the solved ones.
-    """
-
-    def __init__(self, kept: Indices, system: System, entries: Array, *, compiled: bool) -> None:
-        count = len(system.tracer.formulation.owners)
-        place = np.full(count, -1, np.intp)
-        place[kept] = np.arange(len(kept))
-        solved = np.flatnonzero(place[system.rows] >= 0)
-        square = place[system.rows[solved]], system.columns[solved], len(kept), solved
-        values = entries if compiled else None
-        self.kept, self.dropped = kept, np.setdiff1d(np.arange(count), kept)
-        self.pattern, self.blocks = Pattern(*square, values), Blocks(*square, values)
-
-    def begin(self) -> None:
-        """Forget the orders of before."""
-        self.pattern.begin()
-        self.blocks.pattern.begin()
-
-
-@dataclass(frozen=True, eq=False)
-class Poses:
-    """Solved poses, one a lane along the last axis, or a single one without that axis.
-
-    Attributes:
-        sample: inputs of the equations, the time first.
-        state: the pose.
-        rates, accelerations: of the unknowns.
-        sigmas, slopes: of the blocks, and their change by the pose, zero if unknown.
-        largest, high: largest sigmas so far, and since other rows were looked for.
-        sign: of the determinant.
-    """
-
-    sample: Array
-    state: Array
-    rates: Array
-    accelerations: Array
-    sigmas: Array
-    slopes: Array
-    largest: Array
-    high: Array
-    sign: Array
-
-    def lane(self, k: int) -> Poses:
-        """Return one of the poses."""
-        return Poses(*(getattr(self, each.name)[..., k] for each in fields(self)))
-
-    @property
-    def time(self) -> float:
-        """The time of a single pose [s]."""
-        return float(self.sample[0])
 
 
 class Rest(NamedTuple):
@@ -162,26 +95,10 @@ class Motion(NamedTuple):
     regular: Indices
 
 
-FOLD = 32
-"""Rows side by side: of rows as short as the lanes, numpy takes seven times as long."""
-
-
-def fold_rows(function: Any, values: Array) -> Array:
-    """Return the reduction over one or more rows, shape (rows, lanes)."""
-    rows, lanes = values.shape
-    whole = rows - rows % FOLD
-    if whole:
-        some: Array = function.reduce(values[:whole].reshape(-1, FOLD * lanes), axis=0)
-        values = np.concatenate([some.reshape(FOLD, lanes), values[whole:]])
-    return function.reduce(values, axis=0)
-
-
 def largest_size(values: Array) -> Array:
     """Return the largest size of the numbers of each lane, zero without any; NaN if one is."""
-    if not len(values):
-        return np.zeros(len(values.T))
-    sizes: Array = np.abs(values)
-    return fold_rows(np.maximum, sizes)
+    found: Array = np.maximum.reduce(np.abs(values), axis=0, initial=0.0)
+    return found
 
 
 def falling(slope: Array, observed: Array) -> tuple[Array, Array]:
@@ -214,6 +131,7 @@ class SparseLanes(Lanes):
     many = POSES
     here: Poses
     rows: Rows
+    _walk: SparseWalk | None = None
     _known: tuple[Array, Array] | None = None
     """Times and poses of the lanes before, if all were accepted."""
 
@@ -231,7 +149,8 @@ class SparseLanes(Lanes):
             if name.startswith("u ") or name.endswith(".translation"):
                 self._scale[at] = frame.unit / extent
         names = ["time", *(f"drive {name}.{k}" for name in request.drivers for k in range(5))]
-        self._angles = [names.index(name) for name in turns(mechanism, request.drivers)]
+        self._turns = turns(mechanism, request.drivers)
+        self._angles = [names.index(name) for name in self._turns]
         self._vectors = [*Columns(request).by_vector]
         self.worst = np.zeros((len(WORST), POSES))
         self.here = self._close_design()
@@ -455,7 +374,7 @@ class SparseLanes(Lanes):
             known, slopes = falling(known[:, 0], observed)
         highest: Array = np.maximum.accumulate(sigmas, axis=1)
         largest, high = (maximum(each[:, None], highest) for each in (here.largest, here.high))
-        sigma = fold_rows(np.minimum, sigmas)
+        sigma: Array = np.minimum.reduce(sigmas, axis=0)
         candidate = Candidate(
             done=solved.done.astype(float),
             closure=closure,
@@ -467,12 +386,12 @@ class SparseLanes(Lanes):
             turns=[sample[k] - previous(sample[k], here.sample[k]) for k in self._angles],
             sigma=sigma,
             before=previous(sigma, here.sigmas.min()),
-            largest=fold_rows(np.minimum, largest),
+            largest=np.minimum.reduce(largest, axis=0),
             reversal=sign - previous(sign, here.sign),
             blocks=[Block(sigmas, previous(sigmas, here.sigmas), maximum(observed, known))],
         )
         self._margins = {
-            name: fold_rows(np.minimum, margin.reshape(-1, POSES))
+            name: np.minimum.reduce(margin.reshape(-1, POSES), axis=0)
             for name, margin in margins(candidate, self._limits).items()
         }
         margin: Array = np.minimum.reduce([*self._margins.values()])
@@ -500,12 +419,46 @@ class SparseLanes(Lanes):
         return largest_size(change * self._scale)
 
     def carry(self, lane: int) -> None:
-        """See `Lanes`; change to better rows there, if the present ones have become much more
-        singular.
-        """
+        """See `Lanes`."""
         found = self._found
         self.here = found.lane(lane)
         self._known = (found.sample[0], found.state) if lane == POSES - 1 else None
+        self._look_for_rows()
+
+    def walk(
+        self, tables: Sequence[Array], count: int, certain: float = CERTAIN
+    ) -> tuple[Array, Array]:
+        """See `Lanes`."""
+        (table,), here, limits = tables, self.here, self._limits
+        if not isinstance(self.system, LargeSystem) or self.system.tables is None:
+            return super().walk(tables, count, certain)
+        if self._walk is None or self._walk.rows is not self.rows:
+            wanted = self._scale, self._turns, self._vectors
+            self._walk = SparseWalk(self.system, self.rows, *wanted)
+        accept = limits.tol, limits.consistent, limits.crossing
+        since = np.array([here.time, *here.sample[self._angles], *accept])
+        motions, tests, self.here = self._walk(
+            here, since, table, count, self._known, certain * limits.tol
+        )
+        followed = tests.shape[1]
+        self.refused = not followed and bool(self._walk.worst[MARGINS, 0] <= 0.0)
+        if followed:
+            whole = followed == count and not count % POSES
+            last = table[0, count - POSES : count], self._walk.poses
+            self._known = last if whole else None
+            self._look_for_rows()
+        return motions, tests
+
+    def reach(self, times: Array, path: Path) -> int:
+        """See `Lanes`."""
+        given = self.sample_tables(np.append(times, times[-1:].repeat(POSES)), path)
+        walked = self.walk(given, len(times), np.inf)[1].shape[1]
+        return walked or super().reach(times, path)
+
+    def _look_for_rows(self) -> None:
+        """Change to better rows at the pose before the lanes, if the present ones have become much
+        more singular.
+        """
         crossing = self._limits.crossing > 0.0
         if (
             not crossing

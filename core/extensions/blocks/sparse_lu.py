@@ -18,8 +18,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...caches import cache_last
+from ...kinematics.compiled.dense_equations import System
 from ...kinematics.structure.degrees_of_freedom import NARROW, Indices
 from ...trajectory import Array
 from ..llvm.machine_code import works
@@ -38,7 +40,7 @@ class SingularError(ArithmeticError):
 
 
 @dataclass(frozen=True, eq=False)
-class _Order:
+class Order:
     """SuperLU's order: the place of each row and column, and the sign of its exchanges of rows."""
 
     rows: Indices
@@ -48,10 +50,18 @@ class _Order:
 
     def solve(self, b: Array, *, transposed: bool) -> Array:
         """Return solutions by the last factors, see `FixedOrder.solve`."""
-        first, last = (self.columns, self.rows) if transposed else (self.rows, self.columns)
+        first, last = self._sides(transposed=transposed)
         ordered = np.empty_like(b)
         ordered[first] = b
         return self.factors.solve(ordered, transposed=transposed).take(last, axis=0)
+
+    def solving(self, given: Indices, found: Indices, *, transposed: bool) -> list[NDArray[Any]]:
+        """Return the table to solve in slots, see `FixedOrder.solving`."""
+        first, last = map(np.argsort, self._sides(transposed=transposed))
+        return self.factors.solving(given[first], found[last], transposed=transposed)
+
+    def _sides(self, *, transposed: bool) -> tuple[Indices, Indices]:
+        return (self.columns, self.rows) if transposed else (self.rows, self.columns)
 
     @property
     def signs(self) -> Array:
@@ -66,7 +76,12 @@ class Pattern:
         at: places of the entries among the values of a matrix, which may have others too.
         values: of one matrix; several ones are factored in its order at first, if that can be by
             machine code. None if each is factored alone.
+
+    Attributes:
+        order: the order in which several are factored.
     """
+
+    order: Order | None
 
     def __init__(
         self, rows: Indices, columns: Indices, n: int, at: Indices, values: Array | None
@@ -76,15 +91,15 @@ class Pattern:
         self._matrix = sparse.csc_matrix(
             (np.arange(len(rows)) + 0.0, (rows, columns)), shape=(n, n)
         )
-        self._at, self._entries = at, at[self._matrix.data.astype(np.intp)]
-        self._places, self._orders = (rows, columns, n), list[_Order]()
+        self.at, self._entries = at, at[self._matrix.data.astype(np.intp)]
+        self._places, self._orders = (rows, columns, n), list[Order]()
         if values is not None and works(load_loops):
             self._reorder(self._factor_or_none(values))
         self.begin()
 
     def begin(self) -> None:
         """Return to the first order: the same matrices have the same factors again."""
-        self._order, self._strayed = self._orders[0] if self._orders else None, 0
+        self.order, self._strayed = self._orders[0] if self._orders else None, 0
 
     def factor(self, values: Array) -> Factors:
         """Return the factors of a matrix.
@@ -105,7 +120,7 @@ class Pattern:
         """Return the factors of some of several matrices, of values of shape (values, m). They are
         good until the next ones of this pattern.
         """
-        order = self._order if values.shape[1] == LANES else None
+        order = self.order if values.shape[1] == LANES else None
         if order is not None:
             order.factors.factor(values)
             good = (order.factors.growth <= GROWTH) & (order.factors.inverse < np.inf)
@@ -128,12 +143,12 @@ class Pattern:
         self._strayed, (row, column) = 0, factors.order
         for order in self._orders:
             if (order.rows == row).all():
-                self._order = order
+                self.order = order
                 return
         rows, columns, n = self._places
         sign = -1.0 if _exchanges(row.tobytes()) % 2 else 1.0
-        self._order = _Order(row, column, sign, FixedOrder(row[rows], column[columns], n, self._at))
-        self._orders.append(self._order)
+        self.order = Order(row, column, sign, FixedOrder(row[rows], column[columns], n, self.at))
+        self._orders.append(self.order)
 
 
 class Factors:
@@ -169,7 +184,7 @@ class Factors:
 class FactorsOfLanes:
     """The factors of several matrices: together, and of some alone, None where one is singular."""
 
-    def __init__(self, together: _Order | None, alone: Mapping[int, Factors | None]) -> None:
+    def __init__(self, together: Order | None, alone: Mapping[int, Factors | None]) -> None:
         self._together, self._alone = together, alone
 
     def regular(self, lanes: Indices) -> Indices:
@@ -205,7 +220,9 @@ class Blocks:
 
     Attributes:
         count: number of blocks.
+        of_rows, of_columns: the block of each row and column.
         pattern: of the entries inside them.
+        start: of inverse iteration, shape (n, 1).
     """
 
     def __init__(
@@ -221,7 +238,8 @@ class Blocks:
         of_columns: Indices = of_rows[row_of]
         inside = of_rows[rows] == of_columns[columns]
         self.pattern = Pattern(rows[inside], columns[inside], n, at[inside], values)
-        self._start = np.random.default_rng(0).normal(size=(n, 1))
+        self.of_rows, self.of_columns = of_rows, of_columns
+        self.start = np.random.default_rng(0).normal(size=(n, 1))
         self._sum_rows, self._sum_columns = (
             sparse.csr_array((np.ones(n), (of, np.arange(n)))) for of in (of_rows, of_columns)
         )
@@ -235,10 +253,38 @@ class Blocks:
         closer the more singular a block is.
         """
         factors, m = self.pattern.factor_lanes(values, lanes), values.shape[1]
-        left = factors.solve(np.repeat(self._start, m, axis=1), transposed=True)
+        left = factors.solve(np.repeat(self.start, m, axis=1), transposed=True)
         right = factors.solve(left)
         squares = self._sum_rows @ left**2, self._sum_columns @ right**2
         return np.sqrt(np.divide(*squares)), factors.signs(m)
+
+
+class Rows:
+    """A choice of the rows to solve.
+
+    Args:
+        kept: the solved ones.
+        entries: of all rows at one pose; several lanes are factored in the order of that pose.
+
+    Attributes:
+        dropped: redundant rows.
+        pattern, blocks: of the solved ones.
+    """
+
+    def __init__(self, kept: Indices, system: System, entries: Array, *, compiled: bool) -> None:
+        count = len(system.tracer.formulation.owners)
+        place = np.full(count, -1, np.intp)
+        place[kept] = np.arange(len(kept))
+        solved = np.flatnonzero(place[system.rows] >= 0)
+        square = place[system.rows[solved]], system.columns[solved], len(kept), solved
+        values = entries if compiled else None
+        self.kept, self.dropped = kept, np.setdiff1d(np.arange(count), kept)
+        self.pattern, self.blocks = Pattern(*square, values), Blocks(*square, values)
+
+    def begin(self) -> None:
+        """Forget the orders of before."""
+        self.pattern.begin()
+        self.blocks.pattern.begin()
 
 
 @cache_last(64)

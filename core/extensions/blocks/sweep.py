@@ -17,6 +17,7 @@ from ...errors import number_of
 from ...failures import FailureKind, PoseFailure
 from ...kinematics.compiled.compiled_model import CLOSED
 from ...kinematics.compiled.request import (
+    LARGEST,
     LARGEST_OF_PARTS,
     SIGMA,
     SMALLEST_OF_PARTS,
@@ -46,6 +47,10 @@ WORST = (*LARGEST_OF_PARTS, *SMALLEST_OF_PARTS)
 CLOSURES, SIGMAS, MARGINS = (WORST.index(name) for name in ("closure", SIGMA, MARGIN))
 """Rows of those."""
 Indices = NDArray[np.intp]
+CERTAIN = (1.0 - 1e-12) * AMPLIFIED / WORSE
+"""Bound of the residual of a certain sample, by the tolerance and the square of sigma: the reverse
+of `is_uncertain`, for sure, not by rounding either.
+"""
 
 
 class Lanes(ABC):
@@ -60,6 +65,7 @@ class Lanes(ABC):
         many: number of lanes.
         worst: the worst tests of all blocks, shape (WORST, room).
         last: the lane of the last time of the last attempt.
+        refused: whether the last walk ended at once, and no closer look accepts its first sample.
     """
 
     mechanism: Mechanism
@@ -70,6 +76,7 @@ class Lanes(ABC):
     many: int
     worst: Array
     last: int = 0
+    refused: bool = False
 
     @cached_property
     def columns(self) -> Columns:
@@ -81,6 +88,15 @@ class Lanes(ABC):
         of each time, positive if accepted.
         """
         return self.attempt_at(self.sample_tables(times, path))
+
+    def reach(self, times: Array, path: Path) -> int:
+        """Attempt neighbouring times, up to the number of lanes; return how many are reached, and
+        predict from the last of them from now on.
+        """
+        accepted = leading(self.attempt_at(self.sample_tables(times, path), neighbours=True))
+        if accepted:
+            self.carry(accepted - 1)
+        return accepted
 
     def solve_near(self, anchor: Anchor, tol: float, *, crossing: bool = False) -> None:
         """Set the pose before the lanes, the tolerance, and whether a singular pose may be
@@ -131,12 +147,15 @@ class Lanes(ABC):
     def carry(self, lane: int) -> None:
         """Predict from a solved lane from now on, whichever it is."""
 
-    def walk(self, tables: Sequence[Array], count: int) -> tuple[Array, Array]:
-        """Follow samples as far as machine code does by itself, each certain; return the motions
-        and the tests of those followed.
+    def walk(
+        self, tables: Sequence[Array], count: int, certain: float = CERTAIN
+    ) -> tuple[Array, Array]:
+        """Follow samples as far as machine code does by itself; return the motions and the tests of
+        those followed.
 
         Args:
             tables: from `sample_tables`, with the last sample `many` times more.
+            certain: bound of the residual, by the tolerance and the square of sigma.
         """
         return np.empty((0, 0)), np.empty((0, 0))
 
@@ -247,11 +266,11 @@ class BlockWalk(Walk):
         lanes, self._parts = self.lanes, parts
         if self.watch and lanes.sound:
             self.sound = lanes.anchor(self.time)
-        # what fails is looked at
-        if not (self.watch or parts) and (count := self._walk(self.samples[at:stop])):
+        if not self.watch and (count := self._walk(self.samples[at:stop])):
             return at + count
-        ahead = self.samples[at : min(at + lanes.many, stop)]
-        accepted = leading(lanes.attempt_at(self.side.inputs(ahead), neighbours=True))
+        accepted, ahead = 0, self.samples[at : min(at + lanes.many, stop)]
+        if self.watch or not lanes.refused:
+            accepted = leading(lanes.attempt_at(self.side.inputs(ahead), neighbours=True))
         if not accepted:
             if lanes.sound and not self.watch:
                 self.sound = lanes.anchor(self.time)
@@ -265,7 +284,7 @@ class BlockWalk(Walk):
         """Follow samples that need no look; return how many there are."""
         first, side = int(ahead[0]), self.side
         if first + len(ahead) == len(side.times) and first <= ahead[-1]:
-            given = [each[:, first:] for each in side.given]
+            given = [each[:, first:] for each in side.given] if first else side.given
         else:
             given = side.inputs(np.append(ahead, ahead[-1:].repeat(self.lanes.many)))
         motions, tests = self.lanes.walk(given, len(ahead))
@@ -283,9 +302,7 @@ class BlockWalk(Walk):
             # the last part is left: a sample ends an iteration of its own
             parts = np.arange(1.0, lanes.many) / lanes.many
             times: Array = self.time + (wanted - self.time) * parts
-            accepted = leading(lanes.attempt_at(lanes.sample_tables(times, path), neighbours=True))
-            if accepted:
-                lanes.carry(accepted - 1)
+            if accepted := lanes.reach(times, path):
                 self.time = float(times[accepted - 1])
                 return None
         reached = part_of_step(
@@ -460,19 +477,17 @@ class _Run:
 
     def trajectory(self) -> Trajectory:
         """Return what is kept."""
-        tests = dict(zip(WORST, self.worst, strict=True))
-        solved = ~np.isnan(tests["closure"])
-        closure, leftover, sigma = (
-            largest_found(each[solved])
-            for each in (tests["closure"], tests["leftover"], -tests[SIGMA])
-        )
+        solved = ~np.isnan(self.worst[CLOSURES])
+        worst = self.worst if solved.all() else self.worst[:, solved]
+        largest = (largest_found(each) for each in (*worst[: len(LARGEST)], -worst[SIGMAS]))
+        closure, leftover, sigma = largest
         return solution(
             self.table.T,
             self.columns.points,
             self.columns.bodies,
             unit=self.lanes.unit,
             solved=solved,
-            iterations=tests[ITERATIONS],
+            iterations=self.worst[WORST.index(ITERATIONS)],
             closure=closure,
             leftover=leftover,
             message="; ".join(self.messages),

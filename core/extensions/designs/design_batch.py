@@ -31,12 +31,11 @@ from ...kinematics.compiled.request import (
     SLOPE_OF,
     SMALLEST,
     TOWARDS,
-    Request,
     WantedOutput,
     accept_by,
     slots_of,
 )
-from ...kinematics.compiled.routes import SAME_TIME, Route, recent_route, start_of
+from ...kinematics.compiled.routes import SAME_TIME, Route, recent_route
 from ...kinematics.continuation.walk import FINER, ROOM, follow_samples
 from ...kinematics.formulation.acceptance_criteria import is_uncertain
 from ...kinematics.formulation.parameters import every_place, placed, places
@@ -498,7 +497,7 @@ def solve_designs(
         name: PointMotion(each["position"], each.get("velocity"), each.get("acceleration"))
         for name, each in motion.items()
     }
-    notes = start_notes(mechanism, request, path, tol)
+    notes = start_notes(route, tol)
     drive = driving_of(mechanism, path, driver, np.array(values, dtype=float))
     return Designs(found, solved, messages, notes, drive)
 
@@ -516,11 +515,12 @@ def _numbers(place: str, given: Array, size: int) -> Array:
     return columns.T
 
 
-def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:
+def start_notes(route: Route, tol: float) -> list[str]:
     """Return notes on the assumed start of many designs, by the nominal one; none if the design
     decides it.
     """
-    start = start_of(mechanism, path)
-    if start.starts_at_design and not start.ambiguous:
+    model = route.model
+    if route.begin.starts_at_design and not route.begin.ambiguous:
         return []
-    return [*prepare(mechanism, replace(request, varied=()), path)(tol).details.get("notes", ())]
+    nominal = prepare(model.mechanism, replace(model.request, varied=()), route.path)
+    return [*nominal(tol).details.get("notes", ())]

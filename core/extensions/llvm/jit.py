@@ -111,7 +111,8 @@ class LlvmCode:
 
     Args:
         often: limit of interpretation, see `OFTEN`; infinite for programs that are never compiled.
-        tables: of all programs, if they are known; those are never compiled.
+        tables: of programs, if they are known; those are never compiled.
+        width: lanes of a vector, by default those of a register.
 
     Attributes:
         stride: slots of a lane, with the cells of intermediate values after `Plan.slots`.
@@ -124,8 +125,9 @@ class LlvmCode:
         plan: Plan,
         often: float = OFTEN,
         tables: Mapping[str, Bytecode] | None = None,
+        width: int = 0,
     ) -> None:
-        self.width, self.plan, self._lock = compiler.vector_width(), plan, Lock()
+        self.width, self.plan, self._lock = width or compiler.vector_width(), plan, Lock()
         # content of the code as a key: writing the text takes longer than loading the code
         self._content = repr([plan.programs, self.width])
         code = None if tables else find(self._content)

@@ -273,10 +273,12 @@ def in_order(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
     that is both source and target is read first.
     """
     targets = {target for _, target in pairs}
-    first = [pair for pair in pairs if pair[0] in targets and pair[0] != pair[1]]
-    rest = [pair for pair in pairs if pair not in first and pair[0] != pair[1]]
-    up = [pair for pair in rest if (pair[0] - pair[1]) % PAGE < PAGE // 2]
-    return first + up + [pair for pair in reversed(rest) if pair not in up]
+    first, up, down = list[tuple[int, int]](), list[tuple[int, int]](), list[tuple[int, int]]()
+    for source, target in pairs:
+        if source != target:
+            near = (source - target) % PAGE < PAGE // 2
+            (first if source in targets else up if near else down).append((source, target))
+    return first + up + down[::-1]
 
 
 def _bits(x: float) -> int:

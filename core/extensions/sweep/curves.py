@@ -166,8 +166,7 @@ def curves(
         SolveError: offsets have a wrong shape or are not finite, or the nominal design cannot be
             solved.
     """
-    ready = prepare_curves(case, places, outputs, slopes)
-    return ready.solve(_offsets(ready, offsets), tol)
+    return next(curves_by_chunk(case, places, [offsets], outputs, slopes, tol=tol))
 
 
 def curves_by_chunk(
@@ -283,7 +282,7 @@ def _number(geometry: Geometry, name: str) -> tuple[dict[str, Array], str]:
 def _offsets(ready: ReadyCurves, given: ArrayLike) -> Array:
     found = real("curves", "offsets", given, "a row for each design, a column for each place")
     expected = ready.varied.moves.shape[1]
-    if found.ndim != 2 or found.shape[1] != expected:
+    if found.shape[1:] != (expected,):
         raise CaseError(
             f"curves: offsets have shape {found.shape}, expected (designs, {expected}): a column"
             " for each place"

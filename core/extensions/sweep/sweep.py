@@ -259,9 +259,8 @@ def sweep_designs(
     with ThreadPoolExecutor(jobs) as pool:  # sorting runs without Python's lock
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
-    model = ready.outputs.designs.route.model
-    notes = start_notes(case.mechanism, model.request, case.sweep.path, tol)
-    run["cases"][case.name]["notes"] += notes
+    route = ready.outputs.designs.route
+    run["cases"][case.name]["notes"] += start_notes(route, tol)
     measured = _speed_figures(
         study, found.count - earlier, jobs if source is None else None, seconds, processor
     )

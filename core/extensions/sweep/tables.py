@@ -281,7 +281,7 @@ def envelope_csv(results: SweepResults) -> str:
         for k, value in enumerate(scale_values(driver_scale, results.driver[swept])):
             found = (column[k] for column in numbers)
             rows.append([name, unit, k, value, driver_unit, *found, *partial])
-    return csv_text(dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
+    return _csv(columns, rows)
 
 
 def gradient_csv(results: SweepResults) -> str:
@@ -300,6 +300,10 @@ def gradient_csv(results: SweepResults) -> str:
                 *(factor * each.scale, its, factor * each.deviation, scale * effect(each), unit),
             ]
         )
+    return _csv(columns, rows)
+
+
+def _csv(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     return csv_text(dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
 
 
@@ -318,7 +322,7 @@ def limits_csv(results: SweepResults) -> str:
         name = each.output or "all"
         shares = (each.share_of_all, each.share_of_complete)
         rows.append([name, unit, *limits, *counts, each.share, *interval, *shares, *indices])
-    return csv_text(dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
+    return _csv(columns, rows)
 
 
 def scale_values(scale: float, values: Iterable[float | None]) -> list[float | None]:

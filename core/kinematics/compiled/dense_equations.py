@@ -102,7 +102,7 @@ class System:
         names = {name: vector(name, len(value)) for name, value in formulation.design.items()}
         ends = [*accumulate(map(len, names.values()), initial=0)]
         self.names = {name: slice(*ends) for name, ends in zip(names, pairwise(ends), strict=True)}
-        self._sampled = [
+        self.sampled = [
             tracer.layout.scalar(TIME),
             *(k for name in tracer.request.drivers for k in vector(f"drive {name}", 5)),
         ]
@@ -269,7 +269,7 @@ class System:
     def _at(self, state: Array, sample: Array) -> Executor:
         executor = self._executor(state.shape[1])
         executor.put(self._state, state)
-        executor.put(self._sampled, sample)
+        executor.put(self.sampled, sample)
         return executor
 
 

@@ -31,11 +31,10 @@ def test_fixed_order_factors_solve_as_dense(n):
     b = np.random.default_rng(0).normal(size=(n, LANES))
     for transposed in (False, True):
         found = order.solve(b, transposed=transposed)
-        for k in range(LANES):
-            matrix = dense[k].T if transposed else dense[k]
-            expected = np.linalg.solve(matrix, b[:, k])
-            # round-off by the condition, below 10 of matrices so dominant, times their rows
-            assert np.abs(found[:, k] - expected).max() <= 100.0 * n * EPSILON
+        matrix = dense.swapaxes(1, 2) if transposed else dense
+        expected = np.linalg.solve(matrix, b.T[..., None])[..., 0].T
+        # round-off by the condition, below 10 of matrices so dominant, times their rows
+        assert np.abs(found - expected).max() <= 100.0 * n * EPSILON
     assert (order.inverse < np.inf).all()
     assert (order.odd == (np.linalg.det(dense) < 0.0)).all()
 

@@ -28,6 +28,7 @@ from kincheck.core import (
 from kincheck.core.extensions.blocks import component_lanes, sparse_lanes
 from kincheck.core.extensions.blocks.sparse_lanes import POSES, SparseLanes, falling
 from kincheck.core.extensions.blocks.sparse_lu import Blocks
+from kincheck.core.extensions.blocks.sweep import Lanes
 from kincheck.core.extensions.laboratory.bench.size import LEAN, circle, pivot, ring
 from kincheck.core.harness.record import Results
 from kincheck.core.kinematics.formulation.acceptance_criteria import least_slope
@@ -401,35 +402,30 @@ def test_nan_error_bound_refuses_sample(monkeypatch):
     assert solve(mechanism, "push", values).solved.all()
 
 
-def test_iterations_of_even_samples_fall(monkeypatch):
-    """Behind the first lanes, the polynomial through those before leaves one iteration a sample.
-    Beyond lanes that are close together it is not used, so that nothing is attempted twice.
+@pytest.mark.parametrize("uneven", [1.0, 64.0])
+@pytest.mark.parametrize("mechanism", [ring(CRANKS), four_bar(SHAPES["plain"], -1.1, "hinges")])
+def test_machine_code_walks_as_arrays_do(monkeypatch, mechanism, uneven):
+    """With redundant rows too. The polynomial through the lanes before leaves most samples one
+    iteration; behind lanes that are close together it is not used.
     """
-    attempts = list[int]()
-
-    def counted(lanes, tables, **given):
-        attempts.append(tables[0].shape[1])
-        return attempt(lanes, tables, **given)
-
-    attempt = SparseLanes.attempt_at
-    monkeypatch.setattr(SparseLanes, "attempt_at", counted)
-    turn = np.linspace(0.0, 0.8, 4 * POSES + 1)
-    found = swept(ring(CRANKS), turn)
-    assert found.solved.all()
-    assert found.iterations[POSES + 1 :].max() <= 1
-    assert attempts == [*[POSES] * 4, 1]
-    attempts.clear()
-    uneven = np.concatenate([turn[:POSES] / 64.0, turn[1:]])
-    assert swept(ring(CRANKS), uneven).solved.all()
-    assert attempts == [POSES] * 5
+    turn = np.linspace(0.0, 0.7, 5 * POSES - 3)
+    turn[:POSES] /= uneven
+    with monkeypatch.context() as changed:
+        changed.delattr(SparseLanes, "attempt_at")
+        walked = swept(mechanism, turn)
+    monkeypatch.setattr(SparseLanes, "walk", Lanes.walk)
+    found = swept(mechanism, turn)
+    assert (walked.iterations == found.iterations).all()
+    assert np.median(found.iterations) <= uneven
+    for name, motion in found.points.items():
+        assert np.abs(motion.acceleration - walked.points[name].acceleration).max() < 1e-12
 
 
 def test_slopes_fall_lane_by_lane():
     rng = np.random.default_rng(6)
     slope, seen = rng.uniform(size=3), rng.uniform(size=(3, POSES)) ** 9
-    known, after = falling(slope, seen)
+    _, after = falling(slope, seen)
     for k in range(POSES):
-        np.testing.assert_array_equal(known[:, k], slope)
         slope = np.maximum(seen[:, k], least_slope(slope))
         np.testing.assert_array_equal(after[:, k], slope)
 

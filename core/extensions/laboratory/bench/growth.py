@@ -14,7 +14,7 @@ from .rounds import Work, take_turns
 from .size import CHAIN, RING, SAMPLES, chain, circle
 
 LOOPS = (1, 2, 5, 10, 19, 20, 40, 80, 200)
-CRANKS = (4, 10, 20, 21, 49, 99, 199)
+CRANKS = (4, 7, 10, 12, 14, 20, 21, 30, 49, 99, 199)
 """Sizes; the neighbours are those at which another method takes over."""
 
 SCHEMA = "kincheck-bench-size/1"
