@@ -14,6 +14,12 @@ KERNEL = Path("docs/pages")
 PLACES = Path("core/extensions"), Path("adapters")
 """Folders of extensions."""
 LINK = re.compile(r"\[(?P<text>[^\[\]]*)\]\((?P<path>[^)\s:#]+)(?P<anchor>#[^)\s]*)?\)")
+NAMED = re.compile(
+    r"^::: (?P<name>kincheck\.core\.extensions[\w.]+)\n"
+    r"|\[(?P<text>[^\[\]]*)\]\(#(?P<link>kincheck\.core\.extensions[\w.]+)\)",
+    re.MULTILINE,
+)
+"""The description of a name of an extension, and a link to it."""
 
 
 def folders() -> list[Path]:
@@ -43,7 +49,8 @@ def add_to(nav: list[dict[str, str | list[dict[str, str] | str]]]) -> None:
 def in_site(markdown: str, folder: Path, address: str) -> str:
     """Return a page with the links that it has in the site.
 
-    A link to a page of an extension that is not there becomes its text.
+    A link to a page or to a name of an extension that is not there becomes its text, and the
+    name is not described.
 
     Args:
         folder: folder of the page's addresses, from the root.
@@ -59,7 +66,11 @@ def in_site(markdown: str, folder: Path, address: str) -> str:
                 return f"[{found['text']}]({target}{found['anchor'] or ''})"
         return found["text"] if is_absent(path) else found[0]
 
-    return LINK.sub(link, markdown)
+    def named(found: re.Match[str]) -> str:
+        path = Path(*(found["name"] or found["link"]).split(".")[1:])
+        return (found["text"] or "") if is_absent(path) else found[0]
+
+    return LINK.sub(link, NAMED.sub(named, markdown))
 
 
 def is_absent(path: Path) -> bool:

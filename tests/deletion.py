@@ -26,6 +26,7 @@ from .support.sources import EXTENSIONS, PACKAGE, ROOT
 COPIED = "core", "adapters", "cases", "tests", "docs", ".github", ".ci"
 FILES = "*.toml", "*.py", "*.md", "*.in", "*.lock", "*.cff", "Makefile", "Containerfile"
 KERNEL = "kernel"
+NAMES = sorted(each.name for each in EXTENSIONS)
 WALKS = (
     *("tests/test_architecture.py", "tests/test_doors.py", "tests/test_packages.py"),
     *("tests/test_public_names.py", "tests/test_source_rules.py", "tests/docs"),
@@ -93,17 +94,14 @@ def needed(name: str) -> set[str]:
 def steps(name: str, folder: Path, options: argparse.Namespace) -> Iterator[Sequence[str]]:
     """Make the copy of a name, and yield the commands to run in it, each when it is ready."""
     pytest = (sys.executable, "-m", "pytest")
-    every = {each.name for each in EXTENSIONS}
     if options.alone:
-        copy_without(every - {name, *needed(name)}, folder)
-        own = Path("tests/extensions", name)
-        if name == KERNEL:
-            yield *pytest, "--numprocesses", "auto"
-        elif (folder / own).exists():
-            yield *pytest, "--numprocesses", "auto", str(own)
+        copy_without(set(NAMES) - {name, *needed(name)}, folder)
+        own = "tests" if name == KERNEL else f"tests/extensions/{name}"
+        if (folder / own).exists():
+            yield *pytest, "--numprocesses", "auto", own
         return
     copy_without([name], folder)
-    yield sys.executable, "-c", WORKS, name, *sorted(every)
+    yield sys.executable, "-c", WORKS, name, *NAMES
     if options.tests:
         for each in those_that_need(name):
             delete(each, folder)
@@ -113,14 +111,13 @@ def steps(name: str, folder: Path, options: argparse.Namespace) -> Iterator[Sequ
 
 def main() -> int:
     """Print a line for each step; return 1 if something broke."""
-    names = sorted(each.name for each in EXTENSIONS)
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", choices=[KERNEL, *names, []])
+    parser.add_argument("names", nargs="*", metavar="NAME", choices=[KERNEL, *NAMES, []])
     parser.add_argument("--tests", action="store_true", help="collect and walk, too")
     parser.add_argument("--alone", action="store_true", help="with its needs alone: its tests")
     options = parser.parse_args()
     failed = False
-    for name in options.names or ([KERNEL, *names] if options.alone else names):
+    for name in options.names or ([KERNEL, *NAMES] if options.alone else NAMES):
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
             environment = {**os.environ, "PYTHONPATH": str(folder / "site")}
@@ -128,8 +125,8 @@ def main() -> int:
                 done = subprocess.run(
                     command, cwd=folder, env=environment, capture_output=True, text=True
                 )
-                broken = done.returncode != 0
-                failed = failed or broken
+                broken = bool(done.returncode)
+                failed |= broken
                 lines = (done.stdout + done.stderr).splitlines() if broken else []
                 print(
                     f"{name}: {'broke' if broken else 'works'}",

@@ -52,6 +52,9 @@ def repository(tmp_path, monkeypatch):
         ("[a](../../../core/extensions/trace/docs/how-to/trace.md#x)", "[a](trace.md#x)"),
         ("[a](../../../core/extensions/gone/docs/how-to/gone.md#x)", "a"),
         ("[a](../../../core/extensions/trace/docs/gone.md)", "[a](../gone.md)"),  # MkDocs warns
+        ("::: kincheck.core.extensions.gone.x.Y\nend", "end"),
+        ("[a](#kincheck.core.extensions.gone.x.Y)", "a"),
+        ("::: kincheck.core.extensions.trace.x.Y\n", None),
         ("[a](forces.md), [b](https://example.org/x.md)", None),
     ],
 )

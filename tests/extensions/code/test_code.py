@@ -15,7 +15,6 @@ from kincheck import cases
 from kincheck.core import KincheckError
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.code import c, fmu, js
-from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from scipy.interpolate import CubicSpline
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
@@ -207,8 +206,9 @@ def test_javascript_of_case_equals_native(name, tmp_path):
 
 @compiled
 def test_parameters_equal_curves(tmp_path):
+    templates = pytest.importorskip("kincheck.core.extensions.hardpoints.templates")
     table = tmp_path / "car.csv"
-    table.write_text(sample_table(TEMPLATES["double_wishbone"]))
+    table.write_text(templates.sample_table(templates.TEMPLATES["double_wishbone"]))
     case = kincheck.load(table, kincheck.Supplied(travel="30mm:7"))
     places, moved = ["tierod_inner z", "uca_outer x"], [0.004, -0.003]
     write(tmp_path, c.files(case, places))

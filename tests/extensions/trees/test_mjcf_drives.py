@@ -15,7 +15,6 @@ DRIVES = {
         Supplied(),
         "3 degrees of freedom ... nothing says what drives it ... JOINT:START:STOP ... 2 more",
     ),
-    "a template": (Supplied("mcpherson", drive=DRIVEN.drive), "--template"),
     "one short": (
         Supplied(drive=DRIVEN.drive, hold=SPRINGS[:1]),
         "3 degrees of freedom, and 2 driven or held ... --hold JOINT for 1 more",
@@ -97,6 +96,11 @@ def test_locked_joint_is_not_driven(tmp_path, found, supplied):
         found,
         supplied,
     )
+
+
+@pytest.mark.needs("hardpoints")
+def test_driven_model_takes_no_template():
+    complains(GRIPPER, "--template", Supplied("mcpherson", drive=DRIVEN.drive))
 
 
 @pytest.mark.parametrize("kind", DRIVES)
