@@ -130,7 +130,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
             "large.csv": "larger than 64000000 bytes",
             "lines.csv": "found 2000001 lines",
             "wide.csv": "found column names only",
-            "deep.json": "maximum recursion depth",
+            "deep.json": "unknown field",
             "words.json": "expected a decimal number",
         }.items()
     },

@@ -126,7 +126,7 @@ def key_again(text: str) -> str:
     """Return the first key of JSON that stands again, with its line."""
     seen = set[str]()
     for path, line in keys_of(text[:LONGEST], ""):
-        if path in seen and path[-1] != "]":
+        if path in seen and not re.search(r"\[\d+\]$", path):
             return f"line {line}: the key {path!r}"
         seen.add(path)
     return "a key"

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import kincheck
+import kincheck.cases
 import numpy as np
 import pytest
 from kincheck.core.cli.main import main
@@ -153,9 +153,9 @@ def test_board_urdf_has_welded_bodies(tmp_path):
 
 def short_strut(tmp_path):  # rod, spring, damper; a ball in the tree
     strut = tmp_path / "strut.toml"
-    text = (Path(kincheck.__path__[0]) / "cases" / "mcpherson_strut_loaded.toml").read_text("utf-8")
-    text = text.replace("duration = 0.5", "duration = 0.1").replace("samples = 101", "samples = 6")
-    strut.write_text(re.sub(r"\[reference\]\n.*\n", "", text), "utf-8")
+    text = kincheck.cases.file("mcpherson_strut_loaded").read_text("utf-8")
+    text = re.sub(r"\[reference\]\n.*\n", "", text)
+    strut.write_text(text + "\n[free]\nduration = 0.1\nsamples = 6\n", "utf-8")
     return strut
 
 
@@ -454,9 +454,8 @@ def test_board_urdf_equals_model(tmp_path):
 
 def test_unsupported_constraint_is_board_row(tmp_path):
     case = tmp_path / "rssr.toml"
-    text = (Path(kincheck.__path__[0]) / "cases" / "rssr.toml").read_text("utf-8")
-    text = text.replace("duration = 2.0", "duration = 0.02").replace("samples = 201", "samples = 3")
-    case.write_text(text, "utf-8")
+    text = kincheck.cases.file("rssr").read_text("utf-8")
+    case.write_text(text + "\n[free]\nduration = 0.02\nsamples = 3\n", "utf-8")
     assert board(tmp_path, "--engine", "pinocchio", "--case", case, "--steps", 1) == 0
     for row in rows_of(tmp_path):
         assert row["state"] == "unsupported"

@@ -22,7 +22,7 @@ from kincheck.core.kinematics import continuous, is_continuation, regular_betwee
 
 from ...support.engine_motion import SIMULATORS, installed, rotation
 
-BEYOND = Path(__file__).parents[1] / "data" / "beyond_a_fold.toml"
+BEYOND = Path(__file__).parents[2] / "data" / "beyond_a_fold.toml"
 
 
 @pytest.mark.parametrize("name", ["native", *SIMULATORS])
