@@ -38,7 +38,7 @@ settings.load_profile("repeatable")
 gc.set_threshold(50_000, 20, 20)
 
 NATIVE = Fake("native")
-OF_EXTENSION = re.compile(r"kincheck\.(core\.extensions|adapters)\.\w+")
+OF_EXTENSION = re.compile(r"(kincheck\.core\.extensions|kincheck\.adapters|tests\.extensions)\.\w+")
 
 
 @pytest.hookimpl(wrapper=True)

@@ -224,7 +224,7 @@ def test_schema_contains_own_joint_type(own_joint_types):
     assert "point" in case_schema()["$defs"]["joints.own"]["properties"]
 
 
-@pytest.mark.needs("suspects")
+@pytest.mark.needs("suspects", "hardpoints")
 def test_results_and_regressions_satisfy_schema(tmp_path, capfdbinary):
     found = kincheck.run(["rssr", "mcpherson_suspension"], "native")
     written = json.loads(to_json(found))

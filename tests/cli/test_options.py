@@ -41,7 +41,6 @@ run --joints rssr --reactions | --reactions: the loops of --joints have no masse
 kc rssr --travel -60mm:60mm:5 | rssr: no point is the wheel's centre
 export rssr --at -3degg --to mjcf | '-3degg' is not a number with one of the units
 run rssrr | did you mean 'rssr'? Case files end in
-compare mcpherson_suspension mcpherson_strut | have no output in common
 sweep rssr --vary x --sampling ltin
     | 'ltin' is none of random, latin, sobol; did you mean 'latin'?
 sweep rssr --vary x --order x | 'x' is none of 0, 1, 2
@@ -146,7 +145,7 @@ def test_shared_output_file_is_refused(line, option, other, here, capsys):
     assert not [*(here / "no").iterdir()]
 
 
-@pytest.mark.needs("exports", "writers")
+@pytest.mark.needs("exports", "writers", "assemblies")
 def test_export_constraints_file_keeps_json(here, capsys):
     line = "assemblies four_bar --samples 8 --export urdf --out x.urdf --json x.constraints.json"
     assert main(line.split()) == 2

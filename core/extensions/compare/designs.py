@@ -230,6 +230,7 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
             found += [value, change]
         return found
 
+    sloped = any(each.endswith(PER_TRAVEL) for own in curves.values() for each in own)
     rows: list[list[str]] = []
     cells: list[list[str]] = []
     verdict = [*beyond]
@@ -239,7 +240,7 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
             continue
         labels = (first, *found)
         values = [numbers(each, name, samples) for each in labels]
-        slopes = [numbers(each, slope, [design]) for each in labels]
+        slopes = [numbers(each, slope, [design] * sloped) for each in labels]
         for label, *texts in zip(labels, _fixed(values), _fixed(slopes), strict=True):
             most, k = found.get(label, (0.0, 0))
             at = ["", ""] if label == first else [_signed_number(most, 2), designs.at(k)]
@@ -260,9 +261,10 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
         if "." not in name
     ]
     changes = [title for head in heads for title in (head, "change")]
-    ends = ["slope, per m", "change", "largest", "at"]
+    ends = [*["slope, per m", "change"] * sloped, "largest", "at"]
     columns = ["output", "design", *changes, *ends]
-    notes = [f"Changes are from {first}. Slopes are at design, per m of travel."] if rows else []
+    said = f"Changes are from {first}." + " Slopes are at design, per m of travel." * sloped
+    notes = [said] * bool(rows)
     notes += [f"Note: {case}: {note}." for case, note in notes_of(designs.results.run)]
     return Section("Outputs", verdict, notes, columns, 2, rows)
 

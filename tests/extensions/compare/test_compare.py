@@ -127,6 +127,7 @@ OLD | found one design, expected two or more
 OLD NEW OLD | found twice
 OLD nosuch.csv | nosuch.csv: no such file
 OLD four_bar | four_bar: found the driver crank, expected stroke
+mcpherson_suspension mcpherson_strut | have no output in common
 OLD NEW --tolerance tow=1 | did you mean 'toe'?
 OLD NEW --tolerance toe=1mm | expected an angle
 OLD NEW --tolerance toe | expected a positive number
@@ -204,6 +205,7 @@ direction = [1, 0, 0]
         file.write_text(text.replace("NAME", name).replace("POINT", point).replace("AXIS", axis))
         files.append(str(file))
     assert main(["compare", *files, "--json", str(tmp_path / "d.json")]) == 0
+    assert "per m of travel" not in capsys.readouterr().out
     found = json.loads((tmp_path / "d.json").read_text())["run"]["comparison"]["points"]
     assert {each["point"]: each["moved by [mm]"] for each in found} == {
         "joints.axle.point": "5, 0, 0",

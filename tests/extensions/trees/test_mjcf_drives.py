@@ -70,7 +70,6 @@ DRIVES = {
         Supplied(drive=DRIVEN.drive, hold=("right_driver_joint",)),
         "--hold ... which is driven",
     ),
-    "units": (Supplied(units="mm"), "--units ... a model ... --drive, --hold"),
 }
 
 
@@ -101,6 +100,7 @@ def test_locked_joint_is_not_driven(tmp_path, found, supplied):
 @pytest.mark.needs("hardpoints")
 def test_driven_model_takes_no_template():
     complains(GRIPPER, "--template", Supplied("mcpherson", drive=DRIVEN.drive))
+    complains(GRIPPER, "--units ... a model ... --drive, --hold", Supplied(units="mm"))
 
 
 @pytest.mark.parametrize("kind", DRIVES)
