@@ -298,8 +298,8 @@ def unread_beside(file: Path, *read: Path) -> list[str]:
     if not read and any(name.lower().endswith(".urdf") for name in names):
         return []
     data = r"\.(?:ya?ml|json|toml)"
-    own = rf"|{re.escape(file.stem)}{data}" * bool(read)
-    other = re.compile(rf"{_LOOPS}(?:{data}|\.(?:xml|csv|txt|ini|cfg)){own}", re.IGNORECASE)
+    own = rf"{re.escape(file.stem)}{data}"
+    other = re.compile(rf"{_LOOPS}(?:{data}|\.(?:xml|csv|txt|ini|cfg))|{own}", re.IGNORECASE)
     robots = [Path(name).stem for name in names if name.endswith(file.suffix)]
 
     def is_own(name: str) -> bool:

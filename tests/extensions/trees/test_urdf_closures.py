@@ -95,8 +95,9 @@ def test_closures_of_others_are_noted(tmp_path):
     assert any(each.startswith("warning: held by --hold-rest") for each in notes)
 
 
+@pytest.mark.parametrize("beside", ["loop_closures.yaml", "robot.yaml"])
 @pytest.mark.parametrize("name", ["robot.sdf", "robot.xml"])
-def test_loops_beside_other_format_warn(name, tmp_path):
+def test_loops_beside_other_format_warn(name, beside, tmp_path):
     """Unless a URDF lies there, whose file it is."""
     texts = {
         "robot.sdf": "<sdf version='1.9'><model name='m'><link name='a'/></model></sdf>",
@@ -104,11 +105,8 @@ def test_loops_beside_other_format_warn(name, tmp_path):
     }
     file = write(tmp_path, texts[name], name)
     assert not any("beside it" in note for note in read_tree(file).notes)
-    write(tmp_path, "closed_loop: []", "loop_closures.yaml")
-    said = (
-        "warning: loop_closures.yaml beside it may close loops, and is not read; write them into"
-        f" {name}"
-    )
+    write(tmp_path, "closed_loop: []", beside)
+    said = f"warning: {beside} beside it may close loops, and is not read; write them into {name}"
     assert said in read_tree(file).notes
     write(tmp_path, "", "other.urdf")
     assert said not in read_tree(file).notes
