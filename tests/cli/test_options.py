@@ -39,7 +39,6 @@ run rssr --timeout 2e9 | argument --timeout: '2e9' is too large. Give 1e+09 at m
 run rssr --out= | argument --out: found an empty name; give one, or leave it out
 run --joints rssr --reactions | --reactions: the loops of --joints have no masses
 kc rssr --travel -60mm:60mm:5 | rssr: no point is the wheel's centre
-export rssr --at -3degg --to mjcf | '-3degg' is not a number with one of the units
 run rssrr | did you mean 'rssr'? Case files end in
 sweep rssr --vary x --sampling ltin
     | 'ltin' is none of random, latin, sobol; did you mean 'latin'?

@@ -156,7 +156,7 @@ def test_export_command_writes_files(to, endings, tmp_path, monkeypatch, capsys)
         (["--to", "mjfc"], "there is no format 'mjfc'; did you mean 'mjcf'?"),
         (["--to", "mjcf"], "mcpherson_strut.xml exists already"),
         (["--to", "mjcf", "--at", "nan"], "'nan' is not a number"),
-        (["--to", "mjcf", "--at", "3deg"], "'3deg' is not a number with one of the units m, mm"),
+        (["--to", "mjcf", "--at", "-3deg"], "'-3deg' is not a number with one of the units m, mm"),
         (
             ["--to", "mjcf", "--out", "nowhere/strut.xml"],
             "--out nowhere/strut.xml: cannot be written; give a file in a folder that exists",
