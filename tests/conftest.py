@@ -3,6 +3,7 @@
 import gc
 import os
 import re
+import signal
 from functools import cache
 from pathlib import Path
 
@@ -25,6 +26,8 @@ from .support.fakes import Fake, crank
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Processes that tests start keep their bytecode, as those of users do: each would compile its own.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Processes that tests start take Ctrl-C, also where the tests run in the background.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ.pop("COLUMNS", None)  # pytest-xdist sets it for its workers; logs have their own width
 
 # A change is judged by the same examples on every machine. `--hypothesis-profile=search` draws new

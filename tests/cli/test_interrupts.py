@@ -32,18 +32,12 @@ sys.exit(main())
 """
 
 
-def listening():
-    """Have the child take Ctrl-C, also where these tests run in the background."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
 def started(*command):
     return subprocess.Popen(
         [sys.executable, *map(str, command)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=listening,
     )
 
 
