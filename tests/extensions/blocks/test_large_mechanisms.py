@@ -23,12 +23,12 @@ from kincheck.core import (
     Translational,
     Universal,
     solve,
-    solve_designs,
 )
 from kincheck.core.extensions.blocks import component_lanes, sparse_lanes
 from kincheck.core.extensions.blocks.sparse_lanes import POSES, SparseLanes, falling
 from kincheck.core.extensions.blocks.sparse_lu import Blocks
 from kincheck.core.extensions.blocks.sweep import Lanes
+from kincheck.core.extensions.designs.design_batch import solve_designs
 from kincheck.core.extensions.laboratory.bench.size import LEAN, circle, pivot, ring
 from kincheck.core.harness.record import Results
 from kincheck.core.kinematics.formulation.acceptance_criteria import least_slope

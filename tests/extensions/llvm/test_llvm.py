@@ -8,9 +8,10 @@ import math
 
 import numpy as np
 import pytest
-from kincheck.core import solve, solve_designs
+from kincheck.core import solve
 from kincheck.core.algebra import arc_tangent, root
 from kincheck.core.caches import clear_caches
+from kincheck.core.extensions.designs.design_batch import solve_designs
 from kincheck.core.extensions.llvm import compiler
 from kincheck.core.extensions.llvm.executor import LlvmExecutor
 from kincheck.core.extensions.llvm.jit import LlvmCode
