@@ -131,7 +131,6 @@ assemble(None, {}) | assemble: mechanism is None, expected a Mechanism
 find_assemblies(None, {}) | find_assemblies: mechanism is None, expected a Mechanism
 check_joint(3) | joint_class is 3, expected a class
 check_engine(3) | 3 is no engine: name, mode, loop
-check_engine("native", engine_command="x") | Name one engine to check
 run("rssr", [None]) | None is no engine: name, mode, loop
 run("rsrs") | there is no case 'rsrs'; did you mean 'rssr'
 run("rssr", "mujocco") | there is no engine 'mujocco'; did you mean 'mujoco'

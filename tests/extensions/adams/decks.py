@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from kincheck import residuals
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.extensions.adams.dataset import read_dataset
 from kincheck.core.extensions.adams.model import read_markers, read_places, read_units
-from kincheck.core.extensions.residuals.replay import needed_forces
+from kincheck.core.extensions.residuals.replay import needed_forces, residuals
 from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation
 

@@ -7,9 +7,10 @@ import math
 
 import numpy as np
 import pytest
-from kincheck import CaseError, residuals
+from kincheck import CaseError
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
+from kincheck.core.extensions.residuals.replay import residuals
 from kincheck.core.kinematics import NativeSolver
 from scipy.spatial.transform import Rotation
 

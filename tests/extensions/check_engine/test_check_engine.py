@@ -218,3 +218,9 @@ def test_check_engine_finds_fault_of_forces(fault, two, patch):
 @pytest.mark.parametrize("change", ["no fault, with bodies", "", *HARMLESS])
 def test_check_engine_passes_harmless_changes(change, two):
     assert failures(Wrapped(change)) == set()
+
+
+@pytest.mark.needs("recorded")
+def test_check_engine_takes_one_engine():
+    with pytest.raises(kincheck.KincheckError, match="Name one engine to check"):
+        kincheck.check_engine("native", engine_command="x")

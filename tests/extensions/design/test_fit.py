@@ -100,7 +100,6 @@ def test_fit_intervals_hold_known_table(bench):
     assert max(found.deviations.values()) <= DRAWING
 
 
-@pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("name", "change", "size"),
     [
