@@ -57,8 +57,8 @@ def pytest_make_collect_report(collector):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Leave the parameters to the night that `by_day(step)` does not try by day: of several lists
-    of parameters, each value comes with another one of the others.
+    """Mark parameters of a test with `by_day(step)` as nightly, all but each step-th. Several lists
+    count by the sum of their places, so that their values take turns.
     """
     for item in items:
         for step in (each.args[0] for each in item.iter_markers("by_day")):

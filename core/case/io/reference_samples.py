@@ -2,9 +2,8 @@
 with units and the outputs that they hold.
 
 A table may have titles above its head, remarks below, and comments, such as `# signs: iso8855`. A
-head is the name
-of an output, or `OUTPUT.velocity` or `OUTPUT.acceleration`, with or without a unit: `toe [deg]`;
-units may also stand in a row below.
+head is the name of an output, or `OUTPUT.velocity` or `OUTPUT.acceleration`, with or without a
+unit: `toe [deg]`; units may also stand in a row below.
 """
 
 from __future__ import annotations
@@ -67,7 +66,8 @@ class Samples:
         printed: digits of the numbers, by column.
         table: the table that they are from, with the driver values in its column `first`.
         signs: sign convention named in a comment.
-        left_out: comments, titles above the head, and rows without numbers below it.
+        left_out: comments, titles above the head, rows without numbers below it, and remarks beside
+            rows.
     """
 
     file: Path

@@ -278,9 +278,8 @@ class Ready:
         offsets = study.variation.offsets(study.seed, first, count)
         chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
         found = study.empty_chunk
-        size = -(
-            -count // -(-count // self.outputs.at_once)
-        )  # of equal parts: one executor serves all
+        # in equal parts: one executor serves all
+        size = math.ceil(count / math.ceil(count / self.outputs.at_once))
         for start in range(0, count, size):
             part = slice(start, start + size)
             found += self._part(index, first + start, offsets[:, part], chosen[part])
