@@ -99,7 +99,7 @@ def test_equal_references_are_stored_once(path):
         assert len({str(store.results(row.id).references) for row in store.runs()}) == 1
 
 
-def test_shared_text_is_whole_again_with_the_next_run(path):
+def test_damaged_text_becomes_whole_again(path):
     """Else the run that shares a damaged text could not be read."""
     kept(path, [crank()], ENGINES)
     with Store(path) as store:

@@ -262,7 +262,7 @@ def test_question_without_terminal(tmp_path, capsys, monkeypatch):
     assert "all lines are comments" in capsys.readouterr().err
 
 
-def test_one_point_in_two_roles_is_named(tmp_path):
+def test_point_of_two_roles_is_named(tmp_path):
     """A slip in a file of names that solves all the same."""
     text = "".join(f"P {name},{x},{y},{z}\n" for name, (x, y, z) in RACE.items())
     names = {role: f"P {role}" for role in RACE}
