@@ -65,6 +65,29 @@ def test_compare_writes_differences_of_curves(tmp_path, old, new, capsys):
     assert ["tierod_inner", "new", "70, 220, 150", "70, 223, 150", "0, 3, 0"] in page.tables[1][1]
 
 
+def test_printed_changes_are_from_first_design(tmp_path, old, new):
+    """Each change is the value less the value above it, to their digits, and so is the largest."""
+    main(["compare", old, new, "--travel", "40mm:3", "--out", str(tmp_path / "out")])
+    (_, rows), *_ = Page((tmp_path / "out" / "compare.html").read_text()).tables
+    found = [row for row in rows if row[1:2] in (["old"], ["new"])]
+    assert len(found) >= 20
+    for above, below in zip(found[::2], found[1::2], strict=True):
+        changes = list[float]()
+        for k in range(2, len(above) - 2, 2):
+            texts = above[k], below[k], below[k + 1]
+            before, after, change = map(_number, texts)
+            of_each = [len(each.strip().partition(".")[2]) for each in texts if _number(each)]
+            digits = min(of_each, default=9)
+            assert change == pytest.approx(after - before, abs=1.01 * 10.0**-digits)
+            changes.append(change)
+        largest = max(map(abs, changes[:3]))  # of rebound, design and jounce, and not of the slope
+        assert abs(_number(below[-2])) == pytest.approx(largest, rel=0.06)
+
+
+def _number(text):
+    return float(text.replace("−", "-"))
+
+
 def test_compare_converts_units_and_axes(tmp_path, old, capsys):
     inch = table(
         tmp_path / "inch.csv", TEMPLATE.sample, "inch", 0.0254, "rearward,right,up", (-1, -1, 1)
