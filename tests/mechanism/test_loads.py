@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from kincheck.core.errors import MechanismError
 from kincheck.core.joints import Revolute, Spherical
-from kincheck.core.mechanism.body import Body, inertia_matrix
+from kincheck.core.mechanism import body
+from kincheck.core.mechanism.body import Body, Dimension, inertia_matrix
 from kincheck.core.mechanism.loads import (
     ELEMENTS,
     Axes,
@@ -136,3 +137,16 @@ def test_force_element_type_names():
         "torque",
         "torsion_spring_damper",
     ]
+
+
+DIMENSIONS = {name: each for name, each in vars(body).items() if isinstance(each, Dimension)}
+
+
+@pytest.mark.parametrize("dimension", DIMENSIONS.values(), ids=DIMENSIONS)
+def test_unit_of_length_follows_unit_text(dimension):
+    """A newton is a kg m/s^2: the unit's own text says the power of the length."""
+    above, _, below = str(dimension).partition("/")
+    powers = {"N": 1, "m": 1, "m^2": 2}
+    power = sum(powers.get(each, 0) for each in above.split())
+    power -= sum(powers.get(each, 0) for each in below.split("/"))
+    assert dimension.in_kg_and_s(3.0, 1e-3) == pytest.approx(3.0 * 1e3**power, rel=1e-14)

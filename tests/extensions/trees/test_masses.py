@@ -23,7 +23,7 @@ mujoco = pytest.importorskip("mujoco")
 EXACT = 1e-12
 near = partial(np.allclose, rtol=0, atol=EXACT)
 
-WEIGHED = """<mujoco><compiler boundmass="0.01" boundinertia="0.001" balanceinertia="true" inertiagrouprange="0 2"/>
+WEIGHED = """<mujoco><compiler boundmass="0.01" boundinertia="0.001" balanceinertia="true"/>
 <default><geom density="500"/><default class="c"><geom type="capsule" size="0.1 0.2"/></default></default>
 <worldbody><geom size="1"/>
 <body name="a" pos="1 0 2" euler="0 40 0"><joint name="h"/><geom class="c" pos="1 2 3" euler="10 20 30"/>
@@ -38,10 +38,12 @@ WEIGHED = """<mujoco><compiler boundmass="0.01" boundinertia="0.001" balanceiner
   <frame euler="20 30 40"><inertial pos="1 2 3" mass="2" fullinertia="1 2 2.5 .1 .2 .3"/></frame></body>
 <body name="d"><joint/><inertial pos="0 0 0" mass="0.001" diaginertia="1 2 4.5"/></body>
 <body name="e" pos="0 2 0"><joint/><body pos="0 0 1" euler="30 0 0"/></body>
-<body name="f"><joint type="slide"/><geom size="1" mass="0"/><geom size="1" group="4"/><site pos="1 0 0"/></body>
+<body name="f"><joint type="slide"/><geom size="1" mass="0"/><geom size="1" group="4"/><geom size="2" group="7"/>
+  <site pos="1 0 0"/></body>
 </worldbody></mujoco>"""  # noqa: E501
 SETTINGS = {
     "auto": "",
+    "first groups": '<compiler inertiagrouprange="0 2"/>',
     "geoms alone": '<compiler inertiafromgeom="true"/>',
     "bounds": '<compiler boundmass="3" boundinertia="4"/>',
     "no geoms": '<compiler inertiafromgeom="false" boundinertia="0.1"/>',
