@@ -40,7 +40,6 @@ def ask(socket, **message):
 def test_page_proposes_roles_and_saves(server, tmp_path, capsys):
     with page_of(server) as socket:
         found = ask(socket)
-        assert found["type"] == "unnamed"
         assert {each["name"]: each["point"] for each in found["roles"] if each["point"]} == TRUE
         at = next(each["at"] for each in found["points"] if each["name"] == "P9")
         assert at == pytest.approx([1e-3 * x for x in RACE["wheel_center"]])
@@ -62,9 +61,7 @@ def test_page_proposes_roles_and_saves(server, tmp_path, capsys):
 def test_answers_that_cannot_be(server, tmp_path, changed, message):
     with page_of(server) as socket:
         ask(socket)
-        told = ask(socket, type="names", roles=TRUE | changed)
-    assert told["type"] == "invalid"
-    assert message in told["message"]
+        assert message in ask(socket, type="names", roles=TRUE | changed)["message"]
     assert not (tmp_path / "car_names.toml").exists()
 
 
@@ -79,8 +76,8 @@ def test_page_goes_on_to_the_named_table(server, browser):
 def test_page_of_names_checks_nothing(server):
     with page_of(server) as socket:
         ask(socket)
-        told = ask(socket, type="check", engines=["native"])
-    assert told["message"] == "a table without roles has no answer to 'check'"
+        told = ask(socket, type="check", engines=["native"])["message"]
+    assert told == "a table without roles has no answer to 'check'"
 
 
 def test_named_table_needs_no_page(tmp_path):
