@@ -65,7 +65,7 @@ def test_answers_that_cannot_be(server, tmp_path, changed, message):
     assert not (tmp_path / "car_names.toml").exists()
 
 
-def test_page_goes_on_to_the_named_table(server, browser):
+def test_page_goes_on_when_named(server, browser):
     browser.visit(server.address)
     browser.click("#save")
     browser.until("window.kincheckLive && kincheckLive.answer")
