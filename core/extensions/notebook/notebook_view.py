@@ -101,7 +101,7 @@ def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDAr
     for name, line in drawn:
         again, colour = divmod(names.index(name), len(COLOURS))
         look = {"color": COLOURS[colour], "dash": "dash" if again else "solid"}
-        values = np.where(np.isfinite(line), line, None).tolist()
+        values = [y if math.isfinite(y) else None for y in map(float, line)]
         traces.append({"x": x.tolist(), "y": values, "line": look, "meta": name})
     figure = {"data": traces, "layout": {"xaxis": {"title": {"text": below}}}}
     legend = (
