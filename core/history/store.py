@@ -330,7 +330,10 @@ class Store:
             text = msgspec.json.encode(document)
             digest = hashlib.sha256(text).hexdigest()
             self.connection.execute(
-                "INSERT OR IGNORE INTO documents VALUES (?, ?)", (digest, zlib.compress(text))
+                # a text that is damaged in the file is whole again, for all its runs
+                "INSERT INTO documents VALUES (?, ?) ON CONFLICT (digest) DO UPDATE SET content ="
+                " excluded.content WHERE content IS NOT excluded.content",
+                (digest, zlib.compress(text)),
             )
             self.connection.execute(
                 "INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest)

@@ -99,6 +99,17 @@ def test_equal_references_are_stored_once(path):
         assert len({str(store.results(row.id).references) for row in store.runs()}) == 1
 
 
+def test_damaged_text_becomes_whole_again(path):
+    """Else the run that shares a damaged text could not be read."""
+    kept(path, [crank()], ENGINES)
+    with Store(path) as store:
+        before = store.results(1).references
+        store.connection.execute("UPDATE documents SET content = zeroblob(length(content))")
+    kept(path, [crank()], ENGINES)
+    with Store(path) as store:
+        assert store.results(1).references == store.results(2).references == before
+
+
 def test_pair_is_stored_once(path):
     keeping, results = kept(path, [crank()], ENGINES)
     with Store(path) as store:

@@ -121,7 +121,7 @@ def fill_roles(
         _write_names(own, template, filled)
         told.append(f"{own}: written, with the names of the points by role")
     if not missing:
-        return filled, told
+        return filled, [*told, *_shared(given)]
     unused = [name for name in table.points if name not in filled.values()]
     lines = list[str]()
     for role in missing:
@@ -142,6 +142,20 @@ def fill_roles(
         "",
         f"{problem}. Found beside: {listed(unused)}. Rename or add them, or {advice}",
     )
+
+
+def _shared(given: Mapping[str, str]) -> list[str]:
+    """Return a note for each point that is given for several roles: a strut's top may be its
+    spring's, but a slip looks the same.
+    """
+    roles: dict[str, list[str]] = {}
+    for role, name in given.items():
+        roles.setdefault(name, []).append(role)
+    return [
+        f"{' and '.join(several)} are one point, {visible(name)!r}"
+        for name, several in roles.items()
+        if len(several) > 1
+    ]
 
 
 def _by_names(

@@ -262,6 +262,25 @@ def test_question_without_terminal(tmp_path, capsys, monkeypatch):
     assert "all lines are comments" in capsys.readouterr().err
 
 
+def test_point_of_two_roles_is_named(tmp_path):
+    """A slip in a file of names that solves all the same."""
+    text = "".join(f"P {name},{x},{y},{z}\n" for name, (x, y, z) in RACE.items())
+    names = {role: f"P {role}" for role in RACE}
+    supplied = Supplied(
+        names=tmp_path / "names.toml",
+        units="mm",
+        axes="iso",
+        wheel_radius="0.2m",
+        template="double_wishbone",
+    )
+    for given, said in ((names, False), (names | {"uca_rear": names["lca_rear"]}, True)):
+        lines = "".join(f'{role} = "{name}"\n' for role, name in given.items())
+        (tmp_path / "names.toml").write_text(lines)
+        case = load(write(tmp_path, text, "race.csv"), supplied)
+        note = "uca_rear and lca_rear are one point, 'P lca_rear'"
+        assert (note in case.assembly) is said
+
+
 def test_question_at_a_terminal(tmp_path, capsys, monkeypatch):
     file = write(tmp_path, FORMS["de.csv"][0], "de.csv")
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
