@@ -19,7 +19,7 @@ from ...case.io.document import (
     unknown_name,
 )
 from ...case.io.readers import LEFT_OUT
-from ...case.notes import SUSPENSIONS
+from ...case.notes import Range
 from ...case.quantity import with_markers
 from ...case.units import plain
 from ...mechanism.mechanism import Mechanism, Vector
@@ -49,6 +49,9 @@ from .templates import (
     corner_in,
 )
 
+SUSPENSIONS = Range(0.03, 10.0, "a suspension of ")
+"""From model cars to haulage trucks. A wrong unit is an error by a factor of 1000, or at least 40.
+"""
 # Inner joints of a rack near the middle may be a little beyond it. No point of a wheel's suspension
 # is farther beyond the middle than this share of the half track.
 ACROSS = 0.25

@@ -371,9 +371,9 @@ class SuspensionSection(CaseSection):
         assert issubclass(cls, SuspensionOutput)
         return _of_wheel(name, section, cls, table, case)
 
-    def with_derived(self, case: Case, table: SuspensionTable | None) -> Case:
+    def with_derived(self, case: Case, table: SuspensionTable) -> Case:
         """Return the case with derivatives by travel, unless the table wants none."""
-        if table is None or not table.per_travel:
+        if not table.per_travel:
             return case
         return replace(case, outputs=with_slopes(case.outputs, size(case)))
 
