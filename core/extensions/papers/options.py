@@ -60,8 +60,8 @@ class Papers(Form):
         """Return the page with its PDF, and the figures."""
         page: Path | None = options.summary
         folder: Path | None = options.figures
+        from ..reports.svg import svg
         from . import browser
-        from .drawing import svg
         from .paper import paper_of
         from .summary import summary
 
