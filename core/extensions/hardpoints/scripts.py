@@ -20,7 +20,7 @@ from typing import Any, TypeAlias, cast
 from ...case.io.document import fault
 from ...case.units import LENGTHS
 from ...errors import brief
-from .options import NOTHING, WheelOptions
+from .options import WheelOptions
 from .table import HardpointTable, length_name
 from .tree import (
     MOST_LINES,
@@ -55,7 +55,7 @@ class _Array(list[Any]):
     """An array of numbers: Python calculates with each of them, other than with a list."""
 
 
-def read_python(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
+def read_python(file: Path, text: str, supplied: WheelOptions) -> HardpointTable:
     """Return the points of the assignments of a Python script, dictionaries among them. Nothing is
     executed; other values than numbers, texts, lists and dictionaries are left out and listed.
 
