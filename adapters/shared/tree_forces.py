@@ -178,7 +178,7 @@ class TreeForces:
         self.frames: list[BodyFrame] = []
         self.elements = [self._element(each) for each in mechanism.forces]
         self.masses = [
-            Mass(body, self._frame(body.name, body.center_of_mass or body.origin))
+            Mass(body, self._frame(body.name, body.center))
             for body in mechanism.moving
             if body.mass > 0.0
         ]
@@ -287,8 +287,6 @@ class TreeForces:
 def demand_of(body: Body, frame: Any, gravity: Array) -> Array:
     """Return m (a - g) over I wdot + w x I w about the centre of mass, where the frame is."""
     force = body.mass * (frame.acceleration[:3] - gravity)
-    if body.inertia is None:
-        return np.concatenate([force, np.zeros(3)])
     inertia = frame.rotation @ inertia_matrix(body.inertia) @ frame.rotation.T
     w, w_t = frame.velocity[3:], frame.acceleration[3:]
     return np.concatenate([force, inertia @ w_t + skew(w) @ (inertia @ w)])
@@ -298,6 +296,5 @@ def mass_properties(body: Body, origin: Array) -> tuple[float, Array, Array]:
     """Return mass, centre of mass from an origin, and inertia about the centre of mass, shape (3,
     3), at design.
     """
-    center = np.array(body.center_of_mass or body.origin) - origin
-    inertia = np.zeros((3, 3)) if body.inertia is None else inertia_matrix(body.inertia)
-    return body.mass, center, inertia
+    center = np.array(body.center) - origin
+    return body.mass, center, inertia_matrix(body.inertia)

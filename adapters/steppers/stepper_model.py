@@ -261,7 +261,7 @@ def _body(body: Body, chain: Chain, moves: list[Link], twists: Mapping[str, Arra
         "rates": rates.tolist(),
         "twist": twists[body.name].tolist(),
         "mass": body.mass,
-        "center": [*(body.center_of_mass or body.origin)],
+        "center": [*body.center],
         "inertia": inertia_matrix(body.inertia).tolist(),
     }
 

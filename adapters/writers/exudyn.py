@@ -47,7 +47,7 @@ def inertial(body: Body) -> tuple[float, list[float], list[float]]:
     global axes at design; Exudyn puts the product yz first.
     """
     xx, yy, zz, xy, xz, yz = text.six(text.inertia_at_origin(body))
-    center = np.subtract(text.center_of(body), body.origin)
+    center = np.subtract(body.center, body.origin)
     return text.mass_of(body), center.tolist(), [xx, yy, zz, yz, xz, xy]
 
 

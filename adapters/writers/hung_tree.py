@@ -158,7 +158,7 @@ def share_masses(frames: dict[str, Body], ties: Sequence[Tie], mechanism: Mechan
         (link, end), part = tie.links, 1.0 / (1 + ends.count(tie.links[1]))
         if not mechanism.is_fixed(end) and (body := mechanism.body(end)).mass:
             six = body.inertia and (*(part * each for each in body.inertia),)
-            center = body.center_of_mass or body.origin
+            center = body.center
             own = {"mass": part * body.mass, "center_of_mass": center, "inertia": six}
             frames[link], frames[end] = replace(frames[link], **own), replace(frames[end], **own)
 

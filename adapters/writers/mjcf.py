@@ -157,7 +157,7 @@ class _Model:
         at = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
         if self.loaded:
             at = {
-                "pos": numbers(local(frame, text.center_of(frame))),
+                "pos": numbers(local(frame, frame.center)),
                 "mass": numbers(text.mass_of(frame)),
                 "fullinertia": numbers(text.six(text.own_inertia(frame))),
             }

@@ -174,7 +174,7 @@ class _Model:
         """Add a body with its mass."""
         element = ET.SubElement(bodies, "Body", name=_name(body.name))
         add_text(element, "mass", text.mass_of(body))
-        add_text(element, "mass_center", local(body, text.center_of(body)))
+        add_text(element, "mass_center", local(body, body.center))
         add_text(element, "inertia", text.six(text.own_inertia(body)))
 
     def add_joint(self, joints: ET.Element, joint: TreeJoint) -> None:

@@ -134,7 +134,7 @@ class _Model:
         link = ET.SubElement(self.model, "link", name=body.name)
         self.add_pose(link, body.origin, attitude(body))
         inertial = ET.SubElement(link, "inertial")
-        add_text(inertial, "pose", f"{numbers(local(body, text.center_of(body)))} 0 0 0")
+        add_text(inertial, "pose", f"{numbers(local(body, body.center))} 0 0 0")
         add_text(inertial, "mass", text.mass_of(body))
         inertia = ET.SubElement(inertial, "inertia")
         entries = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")

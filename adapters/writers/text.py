@@ -183,11 +183,6 @@ def mass_of(body: Body) -> float:
     return body.mass or STAND_IN[0]
 
 
-def center_of(body: Body) -> Vector:
-    """Return the centre of mass, global at design [m]."""
-    return body.center_of_mass or body.origin
-
-
 def inertia_of(body: Body) -> Array:
     """Return the inertia about the centre of mass, or its placeholder, global axes at design
     [kg m^2], shape (3, 3).
@@ -213,7 +208,7 @@ def six(matrix: Array) -> list[float]:
 
 def inertia_at_origin(body: Body) -> Array:
     """Return the inertia about the body's origin, global axes at design [kg m^2], shape (3, 3)."""
-    arm = np.subtract(center_of(body), body.origin)
+    arm = np.subtract(body.center, body.origin)
     moved = arm @ arm * np.eye(3) - np.outer(arm, arm)
     return inertia_of(body) + mass_of(body) * moved
 

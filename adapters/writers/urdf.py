@@ -229,7 +229,7 @@ class _Model:
         link = next(each for each in self.root.iter("link") if each.get("name") == body.name)
         inertial = ET.Element("inertial")
         link.insert(0, inertial)
-        center = numbers(self.arm(body.name, text.center_of(body)))
+        center = numbers(self.arm(body.name, body.center))
         ET.SubElement(inertial, "origin", xyz=center, rpy="0 0 0")
         ET.SubElement(inertial, "mass", value=numbers(text.mass_of(body)))
         values = [numbers(x) for x in text.six(text.inertia_of(body))]

@@ -77,9 +77,9 @@ DIGITS = 1e-5
 NORMALISED = 4.0 * float(np.finfo(np.float64).eps)
 
 
-def inertia_matrix(inertia: Inertia) -> Array:
-    """Return the matrix of six entries, shape (3, 3)."""
-    xx, yy, zz, xy, yz, xz = inertia
+def inertia_matrix(inertia: Inertia | None) -> Array:
+    """Return the matrix of six entries, shape (3, 3); zero of a point mass."""
+    xx, yy, zz, xy, yz, xz = inertia or (0.0,) * 6
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=np.float64)
 
 
@@ -172,6 +172,11 @@ class Body:
                 f"{who}: has an inertia, but no mass; give mass, or leave inertia out",
                 f"bodies.{self.name}.inertia",
             )
+
+    @property
+    def center(self) -> Vector:
+        """The centre of mass, which is the origin unless given."""
+        return self.center_of_mass or self.origin
 
     def in_frame(self, place: Callable[[Any], Any], unit: float = 1.0) -> Body:
         """Return the body with its points passed to a function, and its inertia in kg and a unit of

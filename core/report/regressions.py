@@ -5,17 +5,16 @@ versions.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TextIO
 
 from markupsafe import Markup
-from rich.console import Console
 from rich.text import Text
 
 from ..case.io.escape import visible
 from ..doors import offers
-from ..errors import number_of, shortened
+from ..errors import shortened
 from ..harness.labels import (
     folded,
     motion_unit,
@@ -226,14 +225,75 @@ def searches(found: Regressions) -> list[str]:
     return lines
 
 
-STEPS = {False: "Steps in the history that still stand", True: "Steps that came and went"}
-"""Titles of the lists of `step_lines`."""
+@dataclass(frozen=True)
+class Group:
+    """A part of the report below a title: findings, or lines.
+
+    Attributes:
+        why: the findings matter.
+        wrong: whether they fail the run.
+        folded: whether a page shows the title alone.
+    """
+
+    title: str
+    count: int
+    folded: bool
+    why: str = ""
+    wrong: bool = False
+    rows: Sequence[Row] = ()
+    lines: Sequence[str] = ()
+
+    @property
+    def more(self) -> str:
+        """The number of rows or lines that are not shown; empty without any."""
+        rest = len(self.rows or self.lines) - LONGEST
+        return f"and {rest} more, all in the JSON" if rest > 0 else ""
+
+    @property
+    def head(self) -> str:
+        """Title, count and why."""
+        return f"{self.title} ({self.count})" + (f": {self.why}" if self.why else "")
 
 
-def lists(found: Regressions) -> list[tuple[bool, str, list[str]]]:
-    """Return the lists behind the findings: whether each is folded, its title and its lines."""
-    steps = [(over, title, step_lines(found.steps, over=over)) for over, title in STEPS.items()]
-    return [(False, "To find the release", searches(found)), *steps]
+def groups(found: Regressions) -> list[Group]:
+    """Return the parts of the report, findings first, the worst first."""
+    made: list[Group] = []
+    for kind in Kind:
+        if each := rows(each for each in found.findings if each.kind is kind):
+            wrong = found.fails(kind)
+            folded = not wrong and kind not in (Kind.FIXED, Kind.JUDGED)
+            title, why = heading(found, kind)
+            made.append(Group(title, len(pairs(found, kind)), folded, why, wrong, each))
+    steps = (step_lines(found.steps, over=over) for over in (False, True))
+    for title, lines, folded in zip(
+        LISTS,
+        (searches(found), *steps, loose_says(found.loose)),
+        (False, False, True, True),
+        strict=True,
+    ):
+        if lines:
+            made.append(Group(title, len(lines), folded, lines=lines))
+    return made
+
+
+LISTS = (
+    "to find the release",
+    "steps in the history that still stand",
+    "steps that came and went",
+    "tolerances that could be tightened",
+)
+"""Titles of the lists behind the findings."""
+
+
+def said(found: Regressions) -> list[str]:
+    """Return the sentences above the groups."""
+    changes: list[str] = []
+    if found.changes:
+        changes = [f"Changed: {', '.join(map(str, found.changes))}."]
+    elif found.against is not None:
+        changes = ["Neither versions nor machine nor commit changed."]
+    passed_by = [text] if (text := passed_by_says(found)) else []
+    return [*changes, *passed_by, *map(accepted_says, found.accepted)]
 
 
 def step_says(step: Step) -> str:
@@ -273,127 +333,49 @@ def loose_says(loose: Sequence[Loose]) -> list[str]:
 
 def to_markdown(found: Regressions) -> str:
     """Return the changes in Markdown, the worst first; long parts are folded."""
-    return "\n".join([f"## {escape_markdown(headline(found))}", "", *_lines(found)]).rstrip() + "\n"
+    lines = [f"## {escape_markdown(headline(found))}"]
+    for each in said(found):
+        lines += ["", escape_markdown(each)]
+    for group in groups(found):
+        title = escape_markdown(group.head[0].upper() + group.head[1:])
+        head = f"<details><summary>{title}</summary>" if group.folded else f"**{title}**"
+        lines += ["", head, ""]
+        if group.rows:
+            lines += ["| engine | case | what |", "| --- | --- | --- |"]
+        for each in group.rows[:LONGEST]:
+            lines.append(row(map(escape_markdown, (each.engine, each.where, each.what))))
+        lines += (f"- {escape_markdown(line)}" for line in group.lines[:LONGEST])
+        lines += ["", f"{group.more}."] if group.more else []
+        lines += ["", "</details>"] if group.folded else []
+    return "\n".join(lines) + "\n"
 
 
 def to_markup(found: Regressions) -> Markup:
     """Return the changes as a part of an HTML page."""
-    groups = [
-        (
-            kind,
-            *heading(found, kind),
-            len(pairs(found, kind)),
-            rows(each for each in found.findings if each.kind is kind),
-        )
-        for kind in Kind
-    ]
     return Markup(
         environment()
         .get_template("regressions.html")
-        .render(
-            headline=headline(found),
-            found=found,
-            groups=[group for group in groups if group[3]],
-            steps=lists(found),
-            passed_by=passed_by_says(found),
-            accepted=[accepted_says(each) for each in found.accepted],
-            loose=loose_says(found.loose),
-            longest=LONGEST,
-        )
+        .render(headline=headline(found), said=said(found), groups=groups(found), longest=LONGEST)
     )
-
-
-def _lines(found: Regressions) -> Iterator[str]:
-    if found.changes:
-        yield f"Changed: {escape_markdown(', '.join(map(str, found.changes)))}."
-    elif found.against is not None:
-        yield "Neither versions nor machine nor commit changed."
-    yield ""
-    yield from [passed_by_says(found), ""] if found.passed_by else []
-    for each in found.accepted:
-        yield from (escape_markdown(accepted_says(each)), "")
-    for kind in Kind:
-        group = rows(each for each in found.findings if each.kind is kind)
-        if not group:
-            continue
-        folded = not found.fails(kind) and kind not in (Kind.FIXED, Kind.JUDGED)
-        name, why = heading(found, kind)
-        title = f"{name.capitalize()} ({len(pairs(found, kind))}): {why}"
-        yield from (
-            [f"<details><summary>{escape_markdown(title)}</summary>", ""]
-            if folded
-            else [f"**{escape_markdown(title)}**", ""]
-        )
-        yield from ("| engine | case | what |", "| --- | --- | --- |")
-        for each in group[:LONGEST]:
-            yield row(map(escape_markdown, (each.engine, each.where, each.what)))
-        yield ""
-        if len(group) > LONGEST:
-            yield from (f"and {len(group) - LONGEST} more, all in the JSON.", "")
-        yield from ["</details>", ""] if folded else []
-    for over, title, lines in lists(found):
-        if lines:
-            yield from (
-                [f"<details><summary>{title} ({len(lines)})</summary>", ""]
-                if over
-                else [f"**{title}**", ""]
-            )
-            yield from (f"- {escape_markdown(line)}" for line in lines[:LONGEST])
-            rest = len(lines) - LONGEST
-            yield from [f"- and {rest} more, all in the JSON"] if rest > 0 else []
-            yield from ["", "</details>", ""] if over else [""]
-    if found.loose:
-        lines = loose_says(found.loose)
-        title = f"Tolerances that could be tightened ({number_of(len(lines), 'case')})"
-        yield from (f"<details><summary>{title}</summary>", "")
-        yield from (f"- {escape_markdown(line)}" for line in lines)
-        yield from ("", "</details>", "")
 
 
 def print_regressions(found: Regressions, file: TextIO) -> None:
     """Print the changes, the worst first."""
     console = terminal.console(file)
-    _print_line(console, headline(found), "bold")
-    if found.changes:
-        _print_line(console, f"changed: {', '.join(map(str, found.changes))}")
-    elif found.against is not None:
-        _print_line(console, "neither versions nor machine nor commit changed")
-    if passed_by := passed_by_says(found):
-        _print_line(console, passed_by)
-    for each in found.accepted:
-        _print_line(console, accepted_says(each))
-    for kind in Kind:
-        group = rows(each for each in found.findings if each.kind is kind)
-        if not group:
-            continue
-        _print_line(console, "")
-        name, why = heading(found, kind)
-        title = f"{name} ({len(pairs(found, kind))}): {why}"
-        _print_line(console, title, "bold red" if found.fails(kind) else "bold")
+
+    def say(line: str, style: str = "") -> None:
+        console.print(Text(visible(line), style=style), soft_wrap=True)
+
+    say(headline(found), "bold")
+    for line in said(found):
+        say(line)
+    for group in groups(found):
+        say("")
+        say(group.head, "bold red" if group.wrong else "bold")
         table = terminal.columns("engine", "case", "what")
-        for each in group[:LONGEST]:
+        for each in group.rows[:LONGEST]:
             table.add_row(*(Text(visible(cell)) for cell in (each.engine, each.where, each.what)))
-        console.print(terminal.indent_table(table))
-        _print_rest(console, len(group))
-    for _, title, lines in lists(found):
-        _print_list(console, title.lower(), lines)
-    _print_list(console, "tolerances that could be tightened", loose_says(found.loose))
-
-
-def _print_list(console: Console, title: str, lines: list[str]) -> None:
-    if not lines:
-        return
-    _print_line(console, "")
-    _print_line(console, f"{title} ({len(lines)})", "bold")
-    for line in lines[:LONGEST]:
-        _print_line(console, f"  {line}")
-    _print_rest(console, len(lines))
-
-
-def _print_rest(console: Console, count: int) -> None:
-    if count > LONGEST:
-        _print_line(console, f"  and {count - LONGEST} more, all in the JSON")
-
-
-def _print_line(console: Console, line: str, style: str = "") -> None:
-    console.print(Text(visible(line), style=style), soft_wrap=True)
+        if group.rows:
+            console.print(terminal.indent_table(table))
+        for line in (*group.lines[:LONGEST], *filter(None, [group.more])):
+            say(f"  {line}")

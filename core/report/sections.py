@@ -175,16 +175,19 @@ class Report:
     verdict: str = ""
 
 
-def page(report: Report) -> str:
-    """Return the report as one HTML file in the style of a run's report."""
+def page(report: Report, **scenes: Any) -> str:
+    """Return the report as one HTML file in the style of a run's report.
+
+    Args:
+        scenes: drawings of mechanisms, by their names in the page.
+    """
     figures = {
         diagram.plot.figure: diagram.figure
         for section in report.sections
         for diagram in section.diagrams
     }
-    parts = figure_parts(figures) if figures else {"css": style_sheet()}
+    scripted = bool(figures or scenes)
+    parts = figure_parts(figures, scenes=scenes) if scripted else {"css": style_sheet()}
     return (
-        environment()
-        .get_template("bench.html")
-        .render(report=report, scripted=bool(figures), **parts)
+        environment().get_template("bench.html").render(report=report, scripted=scripted, **parts)
     )

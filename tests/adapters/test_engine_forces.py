@@ -3,8 +3,6 @@
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from pkgutil import resolve_name
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,17 +10,14 @@ from kincheck import cases
 from kincheck.core.case.case import TIME, Sweep
 from kincheck.core.joints import (
     Cylindrical,
-    Fixed,
     Gear,
     Planar,
     Polynomial,
-    RackPinion,
     Revolute,
     Screw,
     Translational,
 )
 from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism
 from kincheck.core.mechanism.motions import JointAngle
 
@@ -37,7 +32,7 @@ from ..support.driven_chains import (
     pushed_slide,
 )
 from ..support.engine_forces import Beside, force_case, pushed, sweep_case, values
-from ..support.engine_motion import SIMULATORS, cutting, installed, way_by_day
+from ..support.engine_motion import SIMULATORS, installed, way_by_day
 from ..support.joint_loops import TYPES, on_crank
 from ..support.loads import loaded
 from ..support.mechanisms import ORIGIN
@@ -152,15 +147,6 @@ def test_joint_reactions_equal_native(kind, bodies, engine):
     assert solution.details["forces"]["computed_by"]
 
 
-@pytest.mark.parametrize(
-    ("kind", "bodies", "engine"), in_loops(["mujoco", "pinocchio"], TYPES, ["AB"])
-)
-def test_reactions_of_cut_joints_equal_native(kind, bodies, engine):
-    joints = natively(joint_case, kind, bodies)[0].mechanism.joints
-    with cutting(*(joint.name for joint in joints if joint.name != "crank")):
-        assert_as_native(engine, joint_case, kind, bodies)
-
-
 def pendulum(length=0.75, at=ORIGIN):
     """A pendulum about y, its mass beside the hinge along x at design; gravity along -z."""
     x, y, z = at
@@ -189,43 +175,6 @@ def test_reactions_of_pendulum_are_exact(engine, length, at):
     np.testing.assert_allclose(found, expected, rtol=0, atol=AGREE[engine] * largest)
 
 
-def geared():
-    """Two wheels in mesh, a rack on the second, and a plate welded to the rack."""
-    bodies = [
-        Body("pinion"),
-        Body("wheel", (0.5, 0.0, 0.0)),
-        Body("rack", (0.5, 0.25, 0.0)),
-        Body("plate", (0.5, 0.5, 0.25)),
-        Body("foot", (0.0, 0.5, 0.0)),
-    ]
-    along, y = {"point": (0.5, 0.25, 0.0), "axis": (1.0, 0.0, 0.0)}, (0.0, 0.0, 1.0)
-    return Mechanism(
-        "geared",
-        bodies,
-        [
-            Revolute("first", GROUND, "pinion", point=ORIGIN, axis=y),
-            Revolute("second", "wheel", GROUND, point=(0.5, 0.0, 0.0), axis=y),
-            Translational("guide", GROUND, "rack", **along),
-            Fixed("weld", "plate", "rack"),
-            Fixed("anchor", "foot", GROUND),
-        ],
-        drivers=[JointAngle("turn", "first")],
-        couplers=[
-            Gear("mesh", ("first", "second"), ratio=2.0),
-            RackPinion("teeth", ("second", "guide"), radius=-0.25),
-        ],
-    )
-
-
-def gear_case():
-    return force_case(pushed(loaded(geared())), (-0.4, 0.0, 7.0), rate=2.0)
-
-
-@OF_ENGINES
-def test_reactions_of_gear_train_equal_native(engine):
-    assert_as_native(engine, gear_case)
-
-
 def built_in_case(name):
     case = cases.load(name)
     few = case.sweep.values[:: len(case.sweep.values) // 4]
@@ -237,20 +186,6 @@ def built_in_case(name):
 def test_undetermined_reactions_equal_native(name, engine):
     compared, _ = assert_as_native(engine, built_in_case, name)
     assert np.isnan(compared.native).any() == (name != "mcpherson_strut")
-
-
-def wound_up():
-    """The hinge that closes the loop turns round twice; its spring is wound up."""
-    case = cases.load("four_bar")
-    spring = TorsionSpringDamper("clock", "crank_pin", 2.0, damping=0.3, free_angle=0.2)
-    mechanism = replace(loaded(case.mechanism), forces=[spring])
-    return force_case(mechanism, np.linspace(0.0, 9.0, 19), case.sweep.rate, names=["crank_pin"])
-
-
-@OF_ENGINES
-def test_spring_on_cut_joint_counts_turns(engine):
-    compared, _ = assert_as_native(engine, wound_up)
-    assert np.ptp(compared.native[-1]) > 2.0 * 2.0 * np.pi
 
 
 @OF_ENGINES
@@ -265,81 +200,6 @@ def test_forces_absent_without_force_outputs(engine):
 
 
 # Mistakes
-
-
-def still(right):
-    """Newton and Euler without w x I w."""
-
-    def mistaken(body, frame, gravity):
-        seen = SimpleNamespace(acceleration=frame.acceleration, rotation=frame.rotation)
-        seen.velocity = np.zeros(6)
-        return right(body, seen, gravity)
-
-    return mistaken
-
-
-def upwards(right):
-    return lambda self, gravity, masses: right(self, tuple(-g for g in gravity), masses)
-
-
-def other_axes(right):
-    """Products of inertia with the other sign."""
-
-    def mistaken(body, origin):
-        mass, center, inertia = right(body, origin)
-        return mass, center, 2.0 * np.diag(np.diag(inertia)) - inertia
-
-    return mistaken
-
-
-def unshared(right):
-    return lambda mechanism, rows: {joint.name: [] for joint in mechanism.joints}
-
-
-MISTAKES = {
-    **{
-        f"gravity upwards, {name}": (f"{name}.{name}.{model}.set_loads", upwards)
-        for name, model in {
-            "pinocchio": "PinocchioModel",
-            "mujoco": "MuJoCoModel",
-            "dart": "DartModel",
-            "drake": "DrakeModel",
-            "simbody": "SimbodyModel",
-        }.items()
-    },
-    "no gyroscopic term, drake": ("shared.tree_forces.demand_of", still),
-    "no gyroscopic term, simbody": ("shared.tree_forces.demand_of", still),
-    "inertia in other axes, pinocchio": ("pinocchio.pinocchio.mass_properties", other_axes),
-    "inertia in other axes, mujoco": ("mujoco.mujoco.mass_properties", other_axes),
-    "inertia in other axes, exudyn": ("exudyn.rows.mass_properties", other_axes),
-    "moment about the origin, pinocchio": (
-        "shared.tree_forces.from_origin",
-        lambda right: lambda point: right(0.0 * point),
-    ),
-    "moment about the origin, exudyn": (
-        "exudyn.exudyn.Loads._rates",
-        lambda right: lambda self, body, point: right(self, body, 0.0 * point),
-    ),
-    "reaction on the first body, mujoco": (
-        "shared.tree_forces.Site.reaction",
-        lambda right: lambda self, *given: tuple(-each for each in right(self, *given)),
-    ),
-    "driver's torque in the reaction, pinocchio": ("shared.tree_forces.of_relations", unshared),
-    "inertia at the body's frame, mujoco": (
-        "mujoco.mujoco.mass_properties",
-        lambda right: lambda body, origin: (body.mass, *right(body, np.array(body.origin))[1:]),
-    ),
-}
-
-
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_planted_force_mistake_is_found(mistake, monkeypatch):
-    engine, (where, wrong) = mistake.split(", ")[1], MISTAKES[mistake]
-    installed(engine)
-    case, native = natively(joint_case, "universal", "AB")
-    target = f"kincheck.adapters.{where}"
-    monkeypatch.setattr(target, wrong(resolve_name(target)))
-    assert Beside(native, values(case, engine)[0]).worst > 1e-4
 
 
 # Where drivers and couplers act in every engine, against free-body diagrams

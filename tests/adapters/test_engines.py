@@ -12,16 +12,15 @@ import numpy as np
 import pytest
 from kincheck import adapters, cases
 from kincheck.core.case.case import Sweep
-from kincheck.core.case.joint_probe import probe
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
 from kincheck.core.harness.workers.pool import in_workers
-from kincheck.core.joints import Revolute, Spherical
+from kincheck.core.joints import Revolute
 from kincheck.core.mechanism.motions import Driver
 
 from ..support.aborting_engine import GivingUp
-from ..support.engine_motion import ENGINES, TOL, TREES, assert_consistent, installed
+from ..support.engine_motion import ENGINES, TOL, TREES, installed
 from ..support.fakes import Fake, crank, record_of, run_case
 
 ROOT = Path(__file__).parents[2]
@@ -62,20 +61,6 @@ def test_details_name_loop_closures(engine):
         zip(("strut_top", "tie_rod"), CLOSED_BY[engine], strict=True)
     )
     assert details["unknowns"] == details["rank"] == 5
-
-
-@ENGINES
-def test_rates_scale_with_sweep_rate(engine):
-    """Forty times as fast, and backwards; points of fixed bodies stay."""
-    given, values = installed(engine), np.linspace(-0.08, 0.08, 41)
-    slow, fast = (
-        given.solve(given.build(case), case, TOL) for case in (strut(values), strut(values, -40.0))
-    )
-    for name, motion in fast.points.items():
-        assert_consistent(motion, 4e-3 / -40.0)
-        other, largest = slow.points[name], 1.0 + np.abs(motion.acceleration).max()
-        assert np.abs(motion.velocity + 40.0 * other.velocity).max() <= 1e-11
-        assert np.abs(motion.acceleration - 1600.0 * other.acceleration).max() <= 1e-11 * largest
 
 
 @ENGINES
@@ -155,18 +140,6 @@ def test_pinocchio_namesake_package_has_no_version(monkeypatch):
     engine, other = installed("pinocchio"), SimpleNamespace(__version__="0.4")
     monkeypatch.setattr(importlib, "import_module", lambda name: other)
     assert engine.version() is None
-
-
-@pytest.mark.parametrize("engine", TREES)
-def test_spherical_joint_at_small_angles(engine):
-    """By a ten-thousandth of a radian, where a simulator's rotations may be those of a series."""
-    case = probe(Spherical)
-    case = replace(case, sweep=replace(case.sweep, values=np.linspace(-2e-3, 2e-3, 9)))
-    both = installed(engine), adapters.engine("native")
-    found, native = (each.solve(each.build(case), case, TOL) for each in both)
-    assert found.solved.all(), found.message
-    for name, motion in found.points.items():
-        assert np.abs(motion.position - native.points[name].position).max() <= 1e-14
 
 
 @pytest.mark.parametrize("engine", TREES[1:])

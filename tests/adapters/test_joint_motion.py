@@ -8,7 +8,6 @@ from itertools import product
 import numpy as np
 import pytest
 from kincheck.core.joints import (
-    ConstantVelocity,
     Cylindrical,
     Distance,
     Fixed,
@@ -26,7 +25,6 @@ from ..support.engine_motion import (
     SIMULATORS,
     TREES,
     assert_as_native,
-    assert_consistent,
     assert_motion,
     mechanism_of,
     ordered,
@@ -120,27 +118,6 @@ def test_screw_over_turns_is_helix(driver, lead, mirrored, engine, closing):
     assert_motion(found.points["tip"], *expected, atol=(1e-12, 1e-12, 1e-10))
 
 
-@IN_TREE_OR_CUT
-@BOTH_ORDERS
-@pytest.mark.parametrize("swept", ["turn", "push"])
-def test_cylindrical_joint_with_two_drivers(swept, mirrored, engine, closing):
-    sleeve = Cylindrical("sleeve", "ground", "rod", ORIGIN, AXIS)
-    drivers = [JointAngle("turn", "sleeve"), JointDisplacement("push", "sleeve")]
-    mechanism = mechanism_of(
-        [ordered(sleeve, mirrored)],
-        {"tip": ("rod", TIP)},
-        drivers if swept == "turn" else drivers[::-1],
-    )
-    motions = {"push" if swept == "turn" else "turn": Sine(0.3, 0.05)}
-    cut = ["sleeve"] if closing else []
-    found = assert_as_native(engine, mechanism, TURNS, cut=cut, motions=motions)
-    waved, sign = 0.3 * np.sin(0.1 * math.pi * TURNS), -1.0 if mirrored else 1.0
-    turn, push = (TURNS, waved) if swept == "turn" else (waved, TURNS)
-    h = np.array(AXIS) / 3.0
-    expected = rotation(AXIS, sign * turn) @ TIP + np.outer(sign * push, h)
-    assert_motion(found.points["tip"], expected)
-
-
 CLOSED_BY = {
     "mujoco": "weld to an auxiliary body that carries the joint's slides and hinges",
     "simbody": "WeldConstraint, on a body that slide and hinge move on",
@@ -172,63 +149,6 @@ def test_driven_joint_closes_loop(mirrored, engine):
         *on_screw(TURNS, AXIS, TIP, 0.0, 2.0),
         atol=tolerances(engine),
     )
-
-
-@pytest.mark.by_day(3)
-@IN_TREE_OR_CUT
-@BOTH_ORDERS
-@pytest.mark.parametrize("bend", [0.0, 0.6, 1.5])
-def test_constant_velocity_joint_over_turns(bend, mirrored, engine, closing):
-    """Two shafts in bearings, at an angle, over several turns: both have turned alike, which no
-    universal joint does.
-    """
-    # else the bearings carry both shafts, and the joint between them is cut
-    cut = [] if closing else ["out"]
-    k = (math.cos(bend), 0.6 * math.sin(bend), 0.8 * math.sin(bend))
-    joint = ConstantVelocity("joint", "a", "b", ORIGIN, (X, k))
-    joints = [
-        Revolute("in", "ground", "a", (-0.5, 0.0, 0.0), X),
-        ordered(joint, mirrored),
-        Revolute("out", "ground", "b", tuple(0.5 * np.array(k)), k),
-    ]
-    mechanism = mechanism_of(joints, {"tip": ("b", TIP)}, [JointAngle("turn", "in")])
-    found = solved(engine, mechanism, TURNS, 2.0, cut)
-    expected = on_screw(TURNS, k, TIP, 0.0, 2.0)
-    assert_motion(found.points["tip"], *expected, atol=tolerances(engine))
-    if engine in TREES:
-        assert ("joint" in found.details["closures"]) == closing
-
-
-@pytest.mark.by_day(3)
-@IN_TREE_OR_CUT
-@BOTH_ORDERS
-@pytest.mark.parametrize("rounding", [0.0, 8e-3])
-def test_universal_joint_follows_hooke(rounding, mirrored, engine, closing):
-    """Shaft 1 along x, shaft 2 at angle b to it; the cross holds the angle of its arms, rounded or
-    not. With the second bearing cut, a body that turns about two moving axes carries a closure: the
-    only place where a direction has a bias from the angular acceleration.
-    """
-    b, values, rate = 0.6, np.linspace(0.0, np.pi, 145), 6.0
-    first, second = np.array([0.0, 0.0, 1.0]), np.array([-math.sin(b), math.cos(b), rounding])
-    axes = (tuple(first), tuple(second))
-    cross = Universal("cross", "driving", "driven", ORIGIN, axes)
-    joints = [
-        Revolute("in", "ground", "driving", ORIGIN, X),
-        Revolute("out", "ground", "driven", ORIGIN, (math.cos(b), math.sin(b), 0.0)),
-        ordered(cross, mirrored),
-    ]
-    tip = second / np.linalg.norm(second)
-    points = {"first": ("driving", first), "second": ("driven", tip)}
-    mechanism = mechanism_of(joints, points, [JointAngle("t", "in")])
-    found = solved(engine, mechanism, values, rate, ["out"] if closing else []).points
-    cosine = (found["first"].position * found["second"].position).sum(axis=1)
-    assert np.abs(cosine - tip @ first).max() <= 1e-14
-    for motion in found.values():
-        assert_consistent(motion, (values[1] - values[0]) / rate)
-    if rounding == 0.0:
-        angle = np.arctan2(np.sin(values) * math.cos(b), np.cos(values))
-        path = np.outer(np.cos(angle), tip) + np.outer(np.sin(angle), [0.0, 0.0, 1.0])
-        np.testing.assert_allclose(found["second"].position, path, rtol=0, atol=2e-14)
 
 
 @ENGINES

@@ -12,8 +12,7 @@ from kincheck.core import JointAngle, RackPinion, Revolute, Screw, Translational
 from kincheck.core.errors import SolveError
 from kincheck.core.joints import Kind
 
-from ..kinematics.test_equivalence import case_of, motion
-from ..support.engine_motion import installed, mechanism_of
+from ..support.engine_motion import installed, mechanism_of, motion_case
 from ..support.mechanisms import ORIGIN, X, Z, mcpherson, placed
 from .test_projection import Crank
 
@@ -52,6 +51,15 @@ def moved(mechanism, factor, offset=(0.0, 0.0, 0.0)):
     return replace(found, couplers=couplers)
 
 
+def motion(mechanism, values, engine):
+    """Position, velocity and acceleration of the first point, shape (3, n, 3)."""
+    solver, case = installed(engine), motion_case(mechanism, values)
+    found = solver.solve(solver.build(case), case, 1e-12)
+    assert found.solved.all(), found.message
+    moved, *_ = found.points.values()
+    return np.array([moved.position, moved.velocity, moved.acceleration])
+
+
 @OF_SIMULATORS
 @pytest.mark.parametrize("exponent", [-40, -20, 20])
 def test_simulator_motion_scales_with_size(engine, exponent):
@@ -84,13 +92,13 @@ def test_simulator_motion_at_far_place(engine):
 def test_residual_is_in_metres(engine):
     given, residuals = installed(engine), []
     for factor in (1.0, 2.0**-40):
-        case = case_of(moved(mcpherson(), factor), factor * STROKES)
+        case = motion_case(moved(mcpherson(), factor), factor * STROKES)
         residuals.append(given.solve(given.build(case), case, 1e-12).residual / factor)
     assert 0.0 < residuals[0] == residuals[1] < 1e-12
 
 
 def test_own_frame_has_unit_size():
-    case = case_of(moved(jack(), 2.0**-30, (2.0**-9, 0.0, 2.0**-8)), TURNS)
+    case = motion_case(moved(jack(), 2.0**-30, (2.0**-9, 0.0, 2.0**-8)), TURNS)
     frame, own = own_frame(case), in_own_frame(case)
     assert frame.unit == 2.0**-30
     assert frame.origin == (2.0**-9, 0.0, 2.0**-8)
@@ -115,14 +123,14 @@ def test_own_frame_has_unit_size():
 def test_model_of_other_mechanism_is_refused(engine):
     """The numbers of a model have no names: those of another length of the sweep were wrong."""
     chosen = installed(engine)
-    case = case_of(moved(mcpherson(), 1.0), STROKES)
+    case = motion_case(moved(mcpherson(), 1.0), STROKES)
     model = chosen.build(case)
-    shorter = case_of(moved(mcpherson(), 1.0), STROKES[::2])
+    shorter = motion_case(moved(mcpherson(), 1.0), STROKES[::2])
     assert chosen.solve(model, shorter, 1e-12).solved.all()
     for other in (
-        case_of(moved(mcpherson(), 1.0), 1e3 * STROKES),
-        case_of(moved(mcpherson(), 3.0), STROKES),
-        case_of(moved(jack(), 1.0), TURNS),
+        motion_case(moved(mcpherson(), 1.0), 1e3 * STROKES),
+        motion_case(moved(mcpherson(), 3.0), STROKES),
+        motion_case(moved(jack(), 1.0), TURNS),
     ):
         with pytest.raises(SolveError, match="build a model for this case"):
             chosen.solve(model, other, 1e-12)

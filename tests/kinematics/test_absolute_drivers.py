@@ -47,16 +47,6 @@ def test_absolute_driver_values_are_coordinates():
     assert "beyond y = 1 (wanted y = 1.2)" in solve(ARM, "y", [1.2]).message
 
 
-def test_relative_driver_is_measured_from_design():
-    relative = replace(ARM, drivers=[replace(ARM.drivers[0], relative=True)])
-    one, other = (
-        solve(ARM, "y", HEIGHTS).points["tip"],
-        solve(relative, "y", HEIGHTS - 0.6).points["tip"],
-    )
-    assert one.position == pytest.approx(other.position, abs=ROUND_OFF)
-    assert [each.design_value("y") for each in (ARM, relative)] == [pytest.approx(0.6), 0.0]
-
-
 def test_absolute_motion_of_second_driver():
     """A sleeve that turns and slides: the driven height is 0.5 at design."""
     sleeve = Mechanism(

@@ -267,16 +267,6 @@ def test_orientation_of_fast_geared_wheel(sweep):
     assert series(of)[0] == pytest.approx(np.cos(16.0 * turned), abs=1e-9)
 
 
-@pytest.mark.parametrize("start", [4.0, -7.0, 11.0])
-def test_orientation_from_offset_start(start):
-    """The drivers go straight from the design to the start."""
-    motions = {"turn": Sine(start, 1.0, math.pi / 2), "bend": Sine(-start, 0.5, math.pi / 2)}
-    times = np.array([0.0, 0.1, 0.2])
-    turn, bend = (motion.at(times)[0] for motion in motions.values())
-    of = case(Sweep("time", times, motions=motions))
-    assert series(of) == pytest.approx(tumbled(turn, bend), abs=1e-9)
-
-
 @pytest.mark.parametrize("name", [name for name in adapters.ENGINES if name != "native"])
 @pytest.mark.by_day(3)
 @pytest.mark.parametrize("steps", [3, 4, 8, 25])

@@ -193,14 +193,6 @@ def test_traced_forces_equal_svd_forces(name, compiled):
     assert_traced(loaded(case.mechanism), few(case), compiled=compiled)
 
 
-@pytest.mark.by_day(2)
-@pytest.mark.parametrize("style", styles()[1:])
-@pytest.mark.parametrize("name", ["mcpherson_strut", "four_bar"])
-def test_traced_forces_in_row_styles(style, name):
-    case = cases.load(name)
-    assert_traced(loaded(case.mechanism), few(case), style=style)
-
-
 def train():
     """A screw that lifts a nut, geared to a shaft, with an element of every kind."""
     tilted, moments = (0.6, 0.0, 0.8), np.diag([0.3, 0.4, 0.5]) + 0.05
@@ -262,21 +254,6 @@ def test_large_mechanism_forces_by_svd():
     assert not by_program(found)
     assert np.isfinite(found.forces.drivers["turn"]).all()
     assert np.abs(found.forces.power).max() <= 1e-12 * found.forces.largest_power.max()
-
-
-def test_program_holds_requested_forces_only():
-    case = cases.load("mcpherson_strut")
-    mechanism, values = loaded(case.mechanism), case.sweep.values[::40]
-    found = solve(mechanism, "stroke", values, forces=["ball"])
-    assert by_program(found)
-    assert [*found.forces.joints] == ["ball"]
-    with pytest.raises(KeyError):
-        found.forces.joints["tie_rod"]
-    none, one, every = (
-        solve(mechanism, "stroke", values, forces=names).details["program"]["outputs"]["flops"]
-        for names in (False, ["ball"], True)
-    )
-    assert none < one < every
 
 
 def test_nearly_singular_rows_use_svd_forces():

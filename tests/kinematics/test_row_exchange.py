@@ -93,12 +93,6 @@ def test_last_sample_beside_dependent_rows(near):
     assert found.details["smallest_singular_value"] > 0.05
 
 
-def test_bifurcation_exchanges_no_rows():
-    found = solve(locomotive(np.pi), "turn", np.linspace(0.0, 4.0, 33))
-    assert "(bifurcation)" in found.details["notes"][0]
-    assert "rows_chosen_anew" not in found.details
-
-
 @pytest.mark.parametrize(
     ("first", "turn"),
     [(1.0, np.linspace(0.0, 4.0, 41)), (1.8, np.array([0.0, 1.0, BRANCH, 4.0]))],

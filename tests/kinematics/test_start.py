@@ -182,20 +182,6 @@ def test_typed_digits_start_at_design(solved, kind):
     )
 
 
-@pytest.mark.parametrize("solved", WAYS)
-def test_relative_drivers_with_typed_phase(solved):
-    """The sine of pi is 1e-16 and that of 3.14159 is 3e-6, and both are none to who types them."""
-    mechanism = turned_arm()
-    for phase in (math.pi, six(3.0 * math.pi)):
-        motions = {"u": Sine(-9.0, 0.5, phase), "v": Ramp(0.3)}
-        found = solved(case_of(mechanism, motions))
-        assert found.solved.all(), found.message
-        assert found.points["r"].position[:, 0] == pytest.approx(
-            RADIUS * motions["u"].at(TIMES)[0], abs=1e-13
-        )
-        assert found.details["start"]["time"] == 0.0
-
-
 def test_rounded_design_value_is_zero():
     mechanism = arm(180.0)
     assert 0.0 < mechanism.design_value("y") < 1e-15

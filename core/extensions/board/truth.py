@@ -155,7 +155,7 @@ def _energy(mechanism: Mechanism, frames: Mapping[str, Frames]) -> Array:
         if body.mass == 0.0:
             continue
         at = frames[body.name]
-        place, speed = at.at(body.center_of_mass or body.origin)
+        place, speed = at.at(body.center)
         total = total + body.mass * (0.5 * (speed**2).sum(axis=1) - place @ [*mechanism.gravity])
         if body.inertia is not None:
             own = np.einsum("nji,nj->ni", at.R, at.w)

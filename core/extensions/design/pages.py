@@ -19,7 +19,8 @@ from ...report.axis import Axis, driver_axis
 from ...report.drawing import drawing
 from ...report.figures import OverDriver, Style, drawn_values
 from ...report.page_model import Plot
-from ...report.sections import Diagram, Report, environment, figure_parts
+from ...report.sections import Diagram, Report
+from ...report.sections import page as page_of
 from ...report.terminal import with_json
 from ...trajectory import Array
 from ...unit_text import with_unit
@@ -99,11 +100,6 @@ def page(report: Report, case: Case, moves: Mapping[str, float]) -> str:
     Args:
         moves: by place, along the axes of the table [m].
     """
-    figures = {
-        diagram.plot.figure: diagram.figure
-        for section in report.sections
-        for diagram in section.diagrams
-    }
     drawn = drawing(scene(case, poses=False), Axis("travel", "", 1.0, [], "", [], 0, []))
     unit = unit_in_table("m", case)
     for each in case.hardpoints:
@@ -113,8 +109,6 @@ def page(report: Report, case: Case, moves: Mapping[str, float]) -> str:
         if any(way):
             drawn.arrows.append((0, [*each.position], each.name, [way]))
     drawn.unit = unit.name
-    known = environment(Path(__file__).parent)
-    parts = figure_parts(figures, scenes={"moves": msgspec.to_builtins(drawn)})
-    text = known.get_template("bench.html").render(report=report, scripted=True, **parts)
-    moved = known.get_template("moves.html").render()
+    text = page_of(report, moves=msgspec.to_builtins(drawn))
+    moved = Path(__file__).with_name("moves.html").read_text("utf-8")
     return text.replace("</section>", f"</section>{moved}", 1)

@@ -50,6 +50,11 @@ PARTS = ("work", "loop", "batch", "study", "size", "processes")
 # Rounds that settle a median to a tenth of the distance between the quartiles.
 ROUNDS = 20
 
+
+def _rounds(what: str) -> Any:
+    return option(f"{what}; default %(default)s", whole(1), "N", default=ROUNDS)
+
+
 _MAIN = "import sys; from kincheck.core.cli.main import main; sys.exit(main(sys.argv[1:]))"
 
 
@@ -73,9 +78,7 @@ class BenchEngines(Command):
         several="once",
         default=(),
     )
-    rounds: int = option(
-        "rounds of all contestants in turn; default %(default)s", whole(1), "N", default=ROUNDS
-    )
+    rounds: int = _rounds("rounds of all contestants in turn")
     parts: tuple[str, ...] = option(
         "work against precision; whole loops as multiples of Pinocchio's; cost against batch"
         " size, of a study by threads, and against mechanism size; first use and memory;"
@@ -195,18 +198,14 @@ class BenchCompliance(Command):
 
     about = "equilibria and compliance matrices of a suspension, many samples together"
     case: str = argument("case file of kincheck kc", "CASE")
-    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    rounds: int = _rounds("rounds")
     json: str | None = json_file()
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...report.terminal import with_json
-        from .bench.compliance import lines, measure
+        from .bench import compliance
 
-        found = measure(registry.find_case(self.case, driven=False), self.rounds)
-        with with_json(found, self.json) as console:
-            print(*lines(found), sep="\n", file=console.file)
-        return Status.WITHIN
+        return _tell(self, compliance, registry.find_case(self.case, driven=False))
 
 
 @options
@@ -218,20 +217,16 @@ class BenchCurves(Command):
     about = "outputs of many designs, and their slopes by the geometry"
     case: str = argument("table of hardpoints", "TABLE")
     axle: str | None = option("motion of both wheels", metavar="MOTION")
-    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    rounds: int = _rounds("rounds")
     json: str | None = json_file()
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...report.terminal import with_json
-        from .bench.curves import lines, measure
+        from .bench import curves
 
         supplied = Supplied(axle=self.axle)
         case = registry.find_case(self.case, supplied, driven=False)
-        found = measure(case, Path(self.case), supplied, self.rounds)
-        with with_json(found, self.json) as console:
-            print(*lines(found), sep="\n", file=console.file)
-        return Status.WITHIN
+        return _tell(self, curves, case, Path(self.case), supplied)
 
 
 @options
@@ -247,7 +242,7 @@ class BenchNumpy(Command):
         several="once",
         default=WITHOUT,
     )
-    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    rounds: int = _rounds("rounds")
     json: str | None = json_file()
 
     def run(self, registry: Registry) -> int:
@@ -268,7 +263,7 @@ class BenchForces(Command):
         several="once",
         default=(LOADED,),
     )
-    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    rounds: int = _rounds("rounds")
     json: str | None = json_file()
 
     def run(self, registry: Registry) -> int:
@@ -279,12 +274,17 @@ class BenchForces(Command):
 
 
 def _measure_cases(options: BenchNumpy | BenchForces, registry: Registry, bench: Any) -> int:
-    from ...report.terminal import with_json
-
     problems: dict[str, str] = {}
     cases = {case.name: case for case in registry.find_cases(options.case, problems)}
     refuse(problems.values())
-    found = bench.measure(cases, options.rounds)
+    return _tell(options, bench, cases)
+
+
+def _tell(options: Any, bench: Any, *given: Any) -> int:
+    """Measure by a module of benchmarks, and print the results."""
+    from ...report.terminal import with_json
+
+    found = bench.measure(*given, options.rounds)
     with with_json(found, options.json) as console:
         print(*bench.lines(found), sep="\n", file=console.file)
     return Status.WITHIN
@@ -300,19 +300,16 @@ class BenchSize(Command):
     about = "the native engine's cost by size, and its steps"
     loops: tuple[int, ...] = option("loops of chains", whole(1), "N", several="once", default=())
     cranks: tuple[int, ...] = option("cranks of rings", whole(3), "N", several="once", default=())
-    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    rounds: int = _rounds("rounds")
     json: str | None = json_file()
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ...report.terminal import with_json
-        from .bench.growth import CRANKS, LOOPS, lines, measure
+        from .bench import growth
 
-        given = (self.loops, self.cranks) if self.loops or self.cranks else (LOOPS, CRANKS)
-        found = measure(*given, self.rounds)
-        with with_json(found, self.json) as console:
-            print(*lines(found), sep="\n", file=console.file)
-        return Status.WITHIN
+        given = self.loops or self.cranks
+        loops, cranks = (self.loops, self.cranks) if given else (growth.LOOPS, growth.CRANKS)
+        return _tell(self, growth, loops, cranks)
 
 
 @options

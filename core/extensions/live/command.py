@@ -21,7 +21,7 @@ from ...report.progress import complain
 if TYPE_CHECKING:
     from ...case.case import Case
     from ...harness.record import Record, Results
-    from .naming import NamingServer
+    from ..hardpoints.guess import Guess
     from .server import Judge, Live, LiveServer
 
 
@@ -87,63 +87,26 @@ class Serve(Command):
         Raises:
             KincheckError: the file cannot be read, or a library is missing.
         """
-        return self._server(registry, self._reader(registry, self.supplied), framed=True)
+        return self._server(registry, self._reader(registry), framed=True)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         if not self.reference and self.curve.without_curve:
             raise KincheckError(self.curve.without_curve)
-        naming = None if self.measure or self.save else self._naming(registry)
-        if naming is None:
-            return self._serve(registry, self.supplied)
-        try:
-            print(naming.address, flush=True)
-            if not self.no_browser:
-                webbrowser.open(naming.address)
-            naming.saved.wait()
-            said: Any = replace(naming.guess.taken, names=naming.file)
-            stated = [*naming.guess.question().options[:-1], str(naming.file)]
-            complain([f"{naming.file} is written. Next time, add: {shlex.join(stated)}"])
-            return self._serve(registry, said, naming.follow)
-        finally:
-            naming.close()
-
-    def _naming(self, registry: Registry) -> NamingServer | None:
-        """Return the server of the page to name points; None unless a table needs it."""
-        from ..hardpoints.reader import is_table
-        from .naming import NamingServer, naming_of
-
-        file = self._file
-        typed = isinstance(self.case, str | Path) and str(self.case) not in registry.cases()
-        if not (typed and file.is_file() and is_table(file, self.supplied)):
-            return None
-        guess = naming_of(file, self.supplied)
-        return NamingServer(guess, self.port) if guess else None
-
-    def _serve(
-        self, registry: Registry, supplied: Supplied, tell: Callable[[str], object] | None = None
-    ) -> int:
-        """Serve the page until it ends.
-
-        Args:
-            tell: takes another page to the address.
-        """
-        wanted, read = self.measure or 0, self._reader(registry, supplied)
+        wanted = self.measure or 0
+        read = self._reader(registry, named=not (wanted or self.save))
         if self.save:
             return self._write_page(read())
         if wanted:
             _measure_edits(read(), wanted)
             if self.no_browser:
                 return Status.WITHIN
-        port = 0 if tell else self.port  # the other page has it still
-        how = {"port": port, "once": self.once, "measuring": wanted > 0}
+        how = {"port": self.port, "once": self.once, "measuring": wanted > 0}
         server = self._server(registry, read, **how)
         try:
             address = server.address + f"&measure={wanted}" * bool(wanted)
             print(address, flush=True)
-            if tell:
-                tell(address)
-            elif not self.no_browser and not webbrowser.open(address) and wanted:
+            if not self.no_browser and not webbrowser.open(address) and wanted:
                 raise KincheckError(
                     "--measure: no browser is found; give --no-browser, or set BROWSER"
                 )
@@ -155,6 +118,7 @@ class Serve(Command):
         return Status.WITHIN
 
     def _write_page(self, live: Live) -> int:
+        from .naming import LiveNaming
         from .saved import saved_page
 
         served = {"--port": self.port, "--once": self.once, "--measure": self.measure}
@@ -162,6 +126,7 @@ class Serve(Command):
             if given:
                 raise KincheckError(f"{name}: a saved page has no server. Leave it out, or --save.")
         assert self.save
+        assert not isinstance(live, LiveNaming)
         require_writable([("--save", self.save)])
         refuse(written(self.save, saved_page(live).encode()))
         print(self.save)
@@ -176,13 +141,18 @@ class Serve(Command):
     def _file(self) -> Path:
         return Path(self.case if isinstance(self.case, str | Path) else self.case.name)
 
-    def _reader(self, registry: Registry, supplied: Supplied) -> Callable[[], Live]:
-        """Return the function that opens a table of hardpoints, or any other mechanism."""
+    def _reader(self, registry: Registry, *, named: bool = False) -> Callable[[], Live]:
+        """Return the function that opens a table of hardpoints, or any other mechanism.
+
+        Args:
+            named: whether points of a table without roles are named first.
+        """
         from ..hardpoints.reader import is_table
         from .model import LiveModel
+        from .naming import LiveNaming, naming_of
         from .table import LiveTable
 
-        told = list[str]()
+        told, supplied = list[str](), self.supplied
 
         def with_reference(case: Case) -> Case:
             if self.reference is None:
@@ -193,10 +163,19 @@ class Serve(Command):
                 complain(notes)
             return replace(case, assembly=(*case.assembly, *notes))
 
+        def with_names(guess: Guess, names: Path) -> None:
+            nonlocal supplied
+            said: Any = replace(guess.taken, names=names)
+            supplied = said
+            stated = [*guess.question().options[:-1], str(names)]
+            complain([f"{names} is written. Next time, add: {shlex.join(stated)}"])
+
         def read() -> Live:
             case, file, vary = self.case, self._file, self.variation
             typed = isinstance(case, str | Path) and str(case) not in registry.cases()
             if typed and file.is_file() and is_table(file, supplied):
+                if named and (guess := naming_of(file, supplied)):
+                    return LiveNaming(guess, with_names)
                 return LiveTable(file, supplied, with_reference, Path(vary) if vary else None)
             if vary:
                 raise KincheckError(f"--vary: {file} is no table of hardpoints; give one")

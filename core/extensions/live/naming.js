@@ -1,7 +1,6 @@
 "use strict";
 // Points in 3D, and a row for each role: a click on a point gives it to the chosen role.
 
-const token = encodeURIComponent(new URLSearchParams(location.search).get("token") || "");
 const find = (id) => document.getElementById(id);
 const view = { azimuth: 0.7, elevation: 0.35, zoom: 1 };
 let data = null;
@@ -97,15 +96,15 @@ function fill() {
   find("roles").replaceChildren(...rows);
 }
 
-async function save() {
-  const names = Object.fromEntries(data.roles.map(({ name, point }) => [name, point]));
-  const body = JSON.stringify(names);
-  const answer = await fetch(`/names?token=${token}`, { method: "POST", body });
-  const text = await answer.text();
-  find("state").textContent = answer.ok ? `saved: ${text}` : text;
-  if (!answer.ok) return;
-  const next = await (await fetch(`/next?token=${token}`)).json();
-  if (next) location.assign(next);
+const say = (text) => (find("state").textContent = text);
+const send = answererOf(
+  (message) => heard[message.type](message),
+  () => say("connection lost; start kincheck serve again"),
+);
+
+function save() {
+  const roles = Object.fromEntries(data.roles.map(({ name, point }) => [name, point]));
+  send({ type: "names", roles });
 }
 
 function listen(canvas) {
@@ -143,8 +142,8 @@ function listen(canvas) {
   });
 }
 
-async function open() {
-  data = await (await fetch(`/points?token=${token}`)).json();
+function open(message) {
+  data = message;
   document.title = `${data.file}: which point is which?`;
   const lines = [...data.why, ...data.doubts.map((each) => `Doubtful: ${each}.`)];
   const item = (text) => Object.assign(document.createElement("li"), { textContent: text });
@@ -154,6 +153,15 @@ async function open() {
   find("save").addEventListener("click", save);
   window.addEventListener("resize", draw);
   choose(0);
+  document.documentElement.dataset.ready = "";
 }
 
-open();
+const heard = {
+  unnamed: open,
+  saved({ name }) {
+    say(`saved: ${name}`);
+    location.reload(); // the page of the named table
+  },
+  invalid: ({ message }) => say(message),
+  changed: ({ message }) => say(message),
+};

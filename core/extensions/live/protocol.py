@@ -128,6 +128,12 @@ class Propose(_Message, frozen=True):
     boxes: Annotated[dict[Name, Number], msgspec.Meta(max_length=100)]
 
 
+class Names(_Message, frozen=True):
+    """Write the file of names of a table: points by role, empty for none."""
+
+    roles: Annotated[dict[Name, str], msgspec.Meta(max_length=MOST_POINTS)]
+
+
 class Measured(_Message, frozen=True):
     """Tell how long edits took from the page's event to the drawn curves [ms]."""
 
@@ -135,7 +141,7 @@ class Measured(_Message, frozen=True):
 
 
 Asked: TypeAlias = (
-    Solve | Read | Rank | Vary | Move | Reach | Check | Export | Save | Propose | Measured
+    Solve | Read | Rank | Vary | Move | Reach | Check | Export | Save | Propose | Names | Measured
 )
 
 
@@ -223,6 +229,43 @@ class Opening(_Message, frozen=True, kw_only=True):
     limits: Mapping[str, tuple[float | None, float | None]] = {}
     varied: bool = False
     tunable: bool = False
+
+
+class NamelessPoint(msgspec.Struct, frozen=True):
+    """A row of a table without roles: its name, and its place [m], x forward, y left, z up."""
+
+    name: str
+    at: list[float]
+
+
+class Role(msgspec.Struct, frozen=True):
+    """A role of a template.
+
+    Attributes:
+        point: proposed for it; empty for none.
+    """
+
+    name: str
+    meaning: str
+    needed: bool
+    point: str
+
+
+class Unnamed(_Message, frozen=True):
+    """A table whose points have no roles yet: the first message to the page that names them.
+
+    Attributes:
+        why, doubts: of the proposed roles.
+        links: pairs of roles with a link between.
+    """
+
+    file: str
+    template: str
+    why: list[str]
+    doubts: list[str]
+    points: list[NamelessPoint]
+    roles: list[Role]
+    links: list[tuple[str, str]]
 
 
 class Answer(_Message, frozen=True):
@@ -386,6 +429,7 @@ class Changed(_Message, frozen=True):
 
 Told: TypeAlias = (
     Opening
+    | Unnamed
     | Answer
     | Pose
     | Reached

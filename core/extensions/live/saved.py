@@ -27,7 +27,7 @@ from ..hardpoints.saving import new_text
 from ..hardpoints.table import unit_of
 from .model import LiveModel
 from .protocol import Reach, Solve
-from .server import Live, file_of, page_files, page_script
+from .server import file_of, page_files, page_script
 from .table import LiveTable, drawn, geometry_of, live_outputs, structure_of
 
 POLICY = (
@@ -47,7 +47,7 @@ COLUMNS = "name,x,y,z\n"
 Leaf: TypeAlias = tuple[str | int, ...]
 
 
-def saved_page(live: Live) -> str:
+def saved_page(live: LiveTable | LiveModel) -> str:
     """Return the page of a file, with its solver.
 
     Raises:

@@ -12,7 +12,7 @@ import http
 import logging
 import re
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from functools import cache
 from pathlib import Path
@@ -35,6 +35,7 @@ from ...report.page_model import worst_of
 from ...report.report import write_report
 from ...report.sections import SCENE_SCRIPTS, script_of, style_sheet
 from .model import LiveModel
+from .naming import LiveNaming
 from .protocol import (
     LARGEST_MESSAGE,
     MOST_MESSAGES,
@@ -46,6 +47,7 @@ from .protocol import (
     Invalid,
     Measured,
     Move,
+    Names,
     Propose,
     Rank,
     Reach,
@@ -67,15 +69,22 @@ HOST = "127.0.0.1"
 LOCAL = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?", re.IGNORECASE)
 """Names of this machine; any port, for tunnels such as ssh -L."""
 MOST_PAGES = 16
-LIVE_SCRIPTS = (
-    "link.js",
-    "table.js",
-    "planes.js",
-    "figures.js",
-    "sliders.js",
-    "tuning.js",
-    "live.js",
-)
+SCRIPTS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
+    "naming": (("elements.js", "vectors.js", "canvas.js"), ("naming.js",)),
+    "live": (
+        SCENE_SCRIPTS,
+        (
+            "link.js",
+            "table.js",
+            "planes.js",
+            "figures.js",
+            "sliders.js",
+            "tuning.js",
+            "live.js",
+        ),
+    ),
+}
+"""Scripts of each page: those of reports, and its own."""
 NOTEBOOKS = "http://127.0.0.1:* http://localhost:* vscode-webview:"
 """Pages that may show this one in a frame, if it is for a notebook: those of this machine."""
 HEADERS = {
@@ -94,7 +103,7 @@ POLICY = 1008
 GRACE = 2.0
 """Time for a page to load again [s]."""
 
-Live: TypeAlias = LiveTable | LiveModel
+Live: TypeAlias = LiveTable | LiveModel | LiveNaming
 Judge: TypeAlias = Callable[[Case, Sequence[str], Callable[[Record], None]], Results]
 """Solves a case with engines of these names, and tells each record."""
 
@@ -221,7 +230,7 @@ class LiveServer:
                 return None
             busy = "kincheck: too many pages are open; close some\n"
             return self._response(http.HTTPStatus.SERVICE_UNAVAILABLE, busy, "text/plain")
-        if path not in (parts := page_files()):
+        if path not in (parts := page_files(self.live.page)):
             return self._response(
                 http.HTTPStatus.NOT_FOUND, "kincheck: no such page\n", "text/plain"
             )
@@ -294,7 +303,10 @@ class Conversation:
             return
         threads = [
             Thread(target=self._work, args=(kinds, closed), daemon=True)
-            for kinds in ((Solve, Move, Read, Save, Rank, Vary, Reach), (Check, Export, Propose))
+            for kinds in (
+                (Solve, Move, Read, Save, Names, Rank, Vary, Reach),
+                (Check, Export, Propose),
+            )
         ]
         try:
             with suppress(closed):
@@ -362,8 +374,8 @@ class Conversation:
                 )
             )
         try:
-            if isinstance(message, Check | Export):
-                self._judge(message)
+            if isinstance(message, Check | Export) and not isinstance(self.live, LiveNaming):
+                self._judge(self.live, message)
                 return
             answer: Callable[[Asked], Told] | None
             answer = getattr(self.live, type(message).__name__.lower(), None)
@@ -375,6 +387,8 @@ class Conversation:
                 found = answer(message)
                 if isinstance(message, Solve):
                     self.server.points = message.points
+                elif isinstance(message, Names):  # the page loads again
+                    self.server.live = self.server.open_file()
         except KincheckError as error:
             found = self._refused(message, str(error))
         self.tell(msgspec.structs.replace(found, id=message.id))
@@ -388,9 +402,9 @@ class Conversation:
         named = (each for each in names if re.search(rf"\b{re.escape(each)}\b", text))
         return Refused(message=text, point=next(named, ""))
 
-    def _judge(self, message: Check | Export) -> None:
+    def _judge(self, live: LiveTable | LiveModel, message: Check | Export) -> None:
         """Tell the verdict of each engine as it ends, or hand out a file of the results."""
-        live, names = self.live, [*dict.fromkeys(message.engines)]
+        names = [*dict.fromkeys(message.engines)]
         for name in names:
             if name not in self.server.engines:
                 raise KincheckError(f"engines: there is no {name!r}")
@@ -446,17 +460,18 @@ def _parts(request: Any) -> tuple[str, str]:
 
 
 @cache
-def page_files() -> dict[str, tuple[str, str]]:
-    """Return the files of the page by path: content and media type."""
+def page_files(page: str = "live") -> dict[str, tuple[str, str]]:
+    """Return the files of a page by path: content and media type."""
     style = style_sheet() + (HERE / "live.css").read_text("utf-8")
     return {
-        "/": ((HERE / "live.html").read_text("utf-8"), "text/html"),
-        "/live.js": (page_script("socket.js"), "text/javascript"),
+        "/": ((HERE / f"{page}.html").read_text("utf-8"), "text/html"),
+        "/live.js": (page_script("socket.js", page), "text/javascript"),
         "/live.css": (style, "text/css"),
     }
 
 
-def page_script(answerer: str) -> str:
-    """Return the script of the page, with that of the one who answers it."""
-    own = [script_of(name, HERE) for name in (answerer, *LIVE_SCRIPTS)]
-    return "\n".join([*map(script_of, SCENE_SCRIPTS), *own])
+def page_script(answerer: str, page: str = "live") -> str:
+    """Return the script of a page, with that of the one who answers it."""
+    shared, own = SCRIPTS[page]
+    own = [script_of(name, HERE) for name in (answerer, *own)]
+    return "\n".join([*map(script_of, shared), *own])

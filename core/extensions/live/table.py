@@ -68,9 +68,11 @@ class LiveFile:
     """An open file.
 
     Attributes:
+        page: that shows it.
         axis: of the sweep, as in reports.
     """
 
+    page = "live"
     kind: str
     file: Path
     case: Case

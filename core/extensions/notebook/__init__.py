@@ -4,6 +4,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
+    needs=["reports"],
     views={
         "result": "notebook_view:to_html",
         "mechanism": "notebook_view:mechanism_view",

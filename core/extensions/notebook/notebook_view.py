@@ -17,14 +17,16 @@ from ...algebra import quat, rotation_less_identity, vec
 from ...dataset import Dataset
 from ...harness.scene_record import Scene
 from ...mechanism.mechanism import GROUND, MARKER, Mechanism
-from ...report.figures import COLOURS
+from ...report.figures import COLOURS, Figure
 from ...trajectory import Array
 from ...unit_text import with_unit
+from ..reports.svg import svg
 from .tables import columns_of, curves_of, table_of
 
 MOST_ROWS, MOST_COLUMNS, MOST_LINES, MOST_DIAGRAMS = 10, 10, 24, 9
 """Rows and columns of a table, lines of a diagram, and diagrams; the rest is left out, and said."""
-WIDTH, HEIGHT, LEFT, BOTTOM = 320, 170, 58, 30
+SIZE = 320, 170
+"""Of a diagram [px]."""
 VIEW, MARGIN = 300.0, 28.0
 """Larger side of a mechanism, and the room around it [px]."""
 _TURN, _TILT = math.radians(-55.0), math.radians(20.0)
@@ -88,47 +90,20 @@ def _diagrams(data: Dataset) -> Iterator[str]:
 
 
 def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDArray[Any]]) -> str:
-    """Return one diagram as SVG, with gaps for missing numbers."""
+    """Return one diagram, with gaps for missing numbers."""
     lines = [
         (name, line)
         for name, values in columns.items()
         for line in values.reshape(len(values), math.prod(values.shape[1:])).T
     ]
-    drawn = lines[:MOST_LINES]
-    every = np.array([line for _, line in drawn])
-    finite = every[np.isfinite(every)]
-    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
-    first, last = float(np.min(x, initial=np.inf)), float(np.max(x, initial=-np.inf))
-
-    def to_x(values: NDArray[Any]) -> NDArray[Any]:
-        return LEFT + (WIDTH - LEFT - 8) * (values - first) / ((last - first) or 1.0)
-
-    def to_y(values: NDArray[Any]) -> NDArray[Any]:
-        return HEIGHT - BOTTOM - (HEIGHT - BOTTOM - 22) * (values - low) / ((high - low) or 1.0)
-
-    names = [*columns]
-    parts = [
-        f"<text x='{LEFT}' y='13'>{escape(label)}</text>",
-        f"<rect x='{LEFT}' y='22' width='{WIDTH - LEFT - 8}' height='{HEIGHT - BOTTOM - 22}'"
-        " fill='none' stroke='#bbb'/>",
-        f"<text x='{LEFT - 4}' y='{HEIGHT - BOTTOM}' text-anchor='end'>{low:.4g}</text>",
-        f"<text x='{LEFT - 4}' y='30' text-anchor='end'>{high:.4g}</text>",
-        f"<text x='{LEFT}' y='{HEIGHT - BOTTOM + 13}'>{first:.4g}</text>",
-        f"<text x='{WIDTH - 8}' y='{HEIGHT - BOTTOM + 13}' text-anchor='end'>{last:.4g}</text>",
-        f"<text x='{(LEFT + WIDTH) // 2}' y='{HEIGHT - 4}' text-anchor='middle'>{escape(below)}"
-        "</text>",
-    ]
+    drawn, names = lines[:MOST_LINES], [*columns]
+    traces = list[Figure]()
     for name, line in drawn:
         again, colour = divmod(names.index(name), len(COLOURS))
-        dashes = " stroke-dasharray='4 3'" if again else ""
-        known = np.concatenate([[False], np.isfinite(line), [False]])
-        for start, stop in np.flatnonzero(known[1:] != known[:-1]).reshape(-1, 2).tolist():
-            points = zip(to_x(x[start:stop]), to_y(line[start:stop]), strict=True)
-            path = " ".join(f"{a:.1f},{b:.1f}" for a, b in points)
-            parts.append(
-                f"<polyline points='{path}' fill='none' stroke='{COLOURS[colour]}'{dashes}>"
-                f"<title>{escape(name)}</title></polyline>"
-            )
+        look = {"color": COLOURS[colour], "dash": "dash" if again else "solid"}
+        values = [y if math.isfinite(y) else None for y in map(float, line)]
+        traces.append({"x": x.tolist(), "y": values, "line": look, "meta": name})
+    figure = {"data": traces, "layout": {"xaxis": {"title": {"text": below}}}}
     legend = (
         ""
         if len(names) == 1
@@ -140,10 +115,9 @@ def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDAr
     )
     more = f" and {len(lines) - len(drawn)} more" if len(lines) > len(drawn) else ""
     return (
-        "<div style='display:inline-block;margin:4px 12px 4px 0;vertical-align:top'>"
-        f"<svg width='{WIDTH}' height='{HEIGHT}' font-size='11' font-family='sans-serif'"
-        f" fill='currentColor'>{''.join(parts)}</svg>"
-        f"<div style='font-size:11px;max-width:{WIDTH}px'>{legend}{more}</div></div>"
+        "<div style='display:inline-block;margin:4px 12px 4px 0;vertical-align:top;font-size:11px'>"
+        f"<div>{escape(label)}</div>{svg(figure, SIZE)}"
+        f"<div style='max-width:{SIZE[0]}px'>{legend}{more}</div></div>"
     )
 
 

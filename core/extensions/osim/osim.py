@@ -12,14 +12,13 @@ import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
 from pathlib import Path
 from posixpath import join as joined
 from posixpath import normpath
 
 from numpy.polynomial import Polynomial
 
-from ...algebra import IDENTITY, Quat, Vec3, X, Y, Z
+from ...algebra import Quat, Vec3, X, Y, Z
 from ...case.io.document import fault, read_text, shown
 from ...case.io.readers import LARGEST_FILE
 from ...errors import KincheckError
@@ -28,7 +27,7 @@ from ...joints import PiecewisePolynomial
 from ...mechanism.loads import Law
 from ..trees.graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
 from ..trees.masses import mass_in
-from ..trees.place import ORIGIN, Place, turn_about, unit_quaternion
+from ..trees.place import ORIGIN, Place, euler_turn, unit_quaternion
 from ..trees.tree import (
     NO_LIMIT,
     BushingLaw,
@@ -565,8 +564,7 @@ class _Reader:
 
 def _turn(angles: Sequence[float]) -> Quat:
     """Return the turns about x, y and z of the body, one after the other."""
-    turns = (turn_about(axis, angle) for axis, angle in zip((X, Y, Z), angles, strict=True))
-    return unit_quaternion(reduce(Quat.__mul__, turns, IDENTITY))
+    return unit_quaternion(euler_turn("xyz", angles))
 
 
 def _prescribed(coordinate: Element) -> Element | None:

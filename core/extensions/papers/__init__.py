@@ -2,4 +2,4 @@
 
 from ...doors import Extension
 
-EXTENSION = Extension(__name__, forms={"papers": "options:Papers"})
+EXTENSION = Extension(__name__, needs=["reports"], forms={"papers": "options:Papers"})

@@ -62,8 +62,8 @@ class Papers(Form):
         folder: Path | None = options.figures
         if page is None and folder is None:
             return []
+        from ..reports.svg import svg
         from . import browser
-        from .drawing import svg
         from .paper import paper_of
         from .summary import summary
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ...report.sections import Section, environment
-from .drawing import svg
+from ..reports.svg import svg
 from .paper import Paper
 
 T = TypeVar("T")

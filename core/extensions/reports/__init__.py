@@ -1,4 +1,4 @@
-"""Reports of commands, printed and written as files."""
+"""Reports of commands, printed and written as files, and their figures as SVG."""
 
 from ...doors import Extension
 

@@ -187,11 +187,11 @@ def _masses(
             yield f"mass of {x}: {body.mass:.6g} against {other.mass:.6g} kg"
         there = place.put(np.array([[*body.origin, *body.euler_parameters]]), body, other)[0]
         center, inertia = _mass_in_pose(other, there)
-        own = place.shift + rotate_vectors(place.turn, np.array(body.center_of_mass or body.origin))
+        own = place.shift + rotate_vectors(place.turn, np.array(body.center))
         if (far := float(np.linalg.norm(center - own))) > enough + PRINTED * _arm(body):
             yield f"centre of mass of {x}: {far:.2g} m apart"
         axes = _matrix(place.turn)
-        first = axes @ _inertia(body) @ axes.T
+        first = axes @ inertia_matrix(body.inertia) @ axes.T
         if (off := float(np.abs(first - inertia).max())) > 3.0 * PRINTED * np.abs(first).max():
             yield f"inertia of {x}: {off:.2g} kg m^2 apart"
     for file, names in lost.items():
@@ -199,11 +199,7 @@ def _masses(
 
 
 def _arm(body: Body) -> float:
-    return float(np.linalg.norm(np.subtract(body.center_of_mass or body.origin, body.origin)))
-
-
-def _inertia(body: Body) -> Array:
-    return np.zeros((3, 3)) if body.inertia is None else inertia_matrix(body.inertia)
+    return float(np.linalg.norm(np.subtract(body.center, body.origin)))
 
 
 def _matrix(turn: Array) -> Array:
@@ -213,9 +209,9 @@ def _matrix(turn: Array) -> Array:
 def _mass_in_pose(body: Body, pose: Array) -> tuple[Array, Array]:
     """Return centre of mass and inertia of a body, global in a pose."""
     q = times(pose[3:], SIDES * np.array(body.euler_parameters))
-    arm = np.subtract(body.center_of_mass or body.origin, body.origin)
+    arm = np.subtract(body.center, body.origin)
     axes = _matrix(q)
-    return pose[:3] + rotate_vectors(q, arm), axes @ _inertia(body) @ axes.T
+    return pose[:3] + rotate_vectors(q, arm), axes @ inertia_matrix(body.inertia) @ axes.T
 
 
 def _gravity(a: Undriven, b: Undriven, place: Placement) -> Iterator[str]:

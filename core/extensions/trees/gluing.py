@@ -73,8 +73,8 @@ def _whole(body: Body, parts: list[Body]) -> Body:
     masses = [
         Mass(
             each.mass,
-            vec(each.center_of_mass or each.origin),
-            np.zeros((3, 3)) if each.inertia is None else inertia_matrix(each.inertia),
+            vec(each.center),
+            inertia_matrix(each.inertia),
         )
         for each in heavy
     ]

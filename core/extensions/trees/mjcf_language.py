@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 from os.path import isfile
 from pathlib import Path
 
-from ...algebra import IDENTITY, ZERO, Quat, X, Y, Z, cross, quat, vec
+from ...algebra import IDENTITY, ZERO, Quat, cross, quat, vec
 from ...case.io.document import read_text, shown
 from ...case.io.readers import LARGEST_FILE
 from ..xml.element import MOST_ELEMENTS, ZEROS, Apart, Element, file_near, parse_xml, words
 from ..xml.ledger import Asked
-from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion
+from .place import AXES, Place, euler_turn, turn_about, turn_of_axes, turn_to, unit_quaternion
 
 ORIENTATION = words("quat axisangle xyaxes zaxis euler")
 _FRAME = ("name", "childclass", "pos", *ORIENTATION)
@@ -270,11 +270,7 @@ class Compiler:
 
     def euler(self, angles: Sequence[float]) -> Quat:
         """Return the turn of three Euler angles as the model writes them."""
-        found = IDENTITY
-        for letter, value in zip(self.sequence, angles, strict=True):
-            one = turn_about(_AXES[letter.lower()], self.angle(value))
-            found = found * one if letter.islower() else one * found
-        return found
+        return euler_turn(self.sequence, map(self.angle, angles))
 
     def place(self, element: Element) -> Place:
         """Return the place given by pos and one kind of orientation.
@@ -319,9 +315,6 @@ class Compiler:
                 return turn_of_axes(x, y, cross(x, y))
 
 
-_AXES = {"x": X, "y": Y, "z": Z}
-
-
 def read_compiler(root: Element) -> Compiler:
     """Return the settings of all <compiler> elements, the last of which counts.
 
@@ -333,7 +326,7 @@ def read_compiler(root: Element) -> Compiler:
         element.require_known(KNOWN["compiler"])
         degrees = element.choice("angle", ("degree", "radian"), _ANGLES[found.degrees])
         sequence = element.attributes.get("eulerseq", found.sequence)
-        if len(sequence) != 3 or not all(letter.lower() in _AXES for letter in sequence):
+        if len(sequence) != 3 or not all(letter.lower() in AXES for letter in sequence):
             raise element.fault(
                 f"eulerseq: found {shown(sequence)}, expected three of x, y, z, X, Y, Z; correct it"
             )

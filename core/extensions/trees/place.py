@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ...algebra import (
@@ -88,10 +88,18 @@ def turn_by(vector: Vec3) -> Quat:
     return unit_quaternion(Quat(math.cos(0.5 * angle), half * vector))
 
 
-def roll_pitch_yaw(angles: Sequence[float]) -> Quat:
-    """Return the rotation about the fixed axes x, y, z, in this order [rad]."""
-    roll, pitch, yaw = map(turn_about, (X, Y, Z), angles)
-    return yaw * pitch * roll
+AXES = {"x": X, "y": Y, "z": Z}
+
+
+def euler_turn(sequence: str, angles: Iterable[float]) -> Quat:
+    """Return the turn of angles about a sequence of axes [rad]: small letters turn with the body,
+    capital ones stand still.
+    """
+    found = IDENTITY
+    for letter, angle in zip(sequence, angles, strict=True):
+        one = turn_about(AXES[letter.lower()], angle)
+        found = found * one if letter.islower() else one * found
+    return found
 
 
 def turn_to(axis: Vec3) -> Quat:

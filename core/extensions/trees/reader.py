@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...case.io.readers import WITHOUT, Reader, ReaderOptions, readers, text_of
+from ...doors import Offer
+from . import EXTENSION
 from .options import ModelOptions
 
 if TYPE_CHECKING:
@@ -23,11 +25,17 @@ class TreeReader(Reader):
 
     Attributes:
         tag: of the root element.
+        reads: function for the tree of links of a whole document.
+        includes: function for a document with all that it includes; None if it includes nothing.
+        opens: function for the root element of a file; None for XML.
     """
 
     kind: str = "model"
     options: type[ReaderOptions] = ModelOptions
     tag: str = ""
+    reads: Offer = field(kw_only=True)
+    includes: Offer | None = None
+    opens: Offer | None = None
 
     def root(self, file: Path) -> Element:
         """Return the root element of a file; a format that is no XML makes elements of it.
@@ -38,11 +46,7 @@ class TreeReader(Reader):
         """
         from ..xml.element import parse_xml
 
-        return parse_xml(file, text_of(file))
-
-    def whole(self, root: Element) -> Element:
-        """Return a document with all that it includes."""
-        return root
+        return self.opens.load()(file) if self.opens else parse_xml(file, text_of(file))
 
     def tree(self, root: Element) -> Tree:
         """Return the tree of links of a whole document.
@@ -50,7 +54,11 @@ class TreeReader(Reader):
         Raises:
             CaseError: something in it makes no sense.
         """
-        raise NotImplementedError
+        return self.reads.load()(root)
+
+    def whole(self, root: Element) -> Element:
+        """Return a document with all that it includes."""
+        return self.includes.load()(root) if self.includes else root
 
     def read(self, file: Path, options: ModelOptions) -> Case:
         """Return the case of a model, driven and held as the options say."""
@@ -67,37 +75,6 @@ class _Mjcf(TreeReader):
         """Return how surely a text is XML, whose root says more."""
         return 2 * text.lstrip().startswith("<")
 
-    def whole(self, root: Element) -> Element:
-        from .mjcf import whole_mjcf
-
-        return whole_mjcf(root)
-
-    def tree(self, root: Element) -> Tree:
-        from .mjcf import read_mjcf
-
-        return read_mjcf(root)
-
-
-@dataclass(frozen=True)
-class _Urdf(TreeReader):
-    def tree(self, root: Element) -> Tree:
-        from .urdf import read_urdf
-
-        return read_urdf(root)
-
-
-@dataclass(frozen=True)
-class _Sdf(TreeReader):
-    def whole(self, root: Element) -> Element:
-        from .sdf import whole_sdf
-
-        return whole_sdf(root)
-
-    def tree(self, root: Element) -> Tree:
-        from .sdf import read_sdf
-
-        return read_sdf(root)
-
 
 _WRITE = "cannot be read; write it out as MJCF, URDF, SDF or USD from the program that made it"
 _SHAPES = "holds shapes, which say nothing of joints; give the model that names it"
@@ -113,16 +90,24 @@ MJCF = _Mjcf(
         **dict.fromkeys(_MESHES, _SHAPES),
     },
     tag="mujoco",
+    reads=Offer(EXTENSION, "mjcf:read_mjcf"),
+    includes=Offer(EXTENSION, "mjcf:whole_mjcf"),
 )
-URDF = _Urdf(
+URDF = TreeReader(
     suffixes=(".urdf",),
     unread={
         ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
         ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
     },
     tag="robot",
+    reads=Offer(EXTENSION, "urdf:read_urdf"),
 )
-SDF = _Sdf(suffixes=(".sdf", ".world"), tag="sdf")
+SDF = TreeReader(
+    suffixes=(".sdf", ".world"),
+    tag="sdf",
+    reads=Offer(EXTENSION, "sdf:read_sdf"),
+    includes=Offer(EXTENSION, "sdf:whole_sdf"),
+)
 
 
 def is_model(file: Path) -> bool:

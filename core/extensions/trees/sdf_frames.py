@@ -10,7 +10,7 @@ from ...algebra import quat, vec
 from ...case.io.document import shown
 from ...errors import remedy
 from ..xml.element import DEEPEST, Element
-from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
+from .place import ORIGIN, Place, euler_turn, unit_quaternion
 from .tree import WORLD
 
 MODEL, PLACED = "__model__", "placement_frame"
@@ -269,7 +269,7 @@ def pose_of(element: Element | None) -> Place:
         x, y, z, w = numbers[3:]
         return Place(vec(numbers[:3]), unit_quaternion(quat((w, x, y, z))))
     *at, roll, pitch, yaw = element.text_numbers(6, default=(0.0,) * 6)
-    angles = [roll, pitch, yaw]
+    angles = [yaw, pitch, roll]
     if element.choice("degrees", FLAGS, "false") in TRUE:
         angles = [*map(math.radians, angles)]
-    return Place(vec(at), roll_pitch_yaw(angles))
+    return Place(vec(at), euler_turn("zyx", angles))

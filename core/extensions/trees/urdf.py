@@ -14,7 +14,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from ...algebra import Quat, Vec3, X, Y, Z, vec
+from ...algebra import Quat, Vec3, X, Y, vec
 from ...case.io.document import shown
 from ...errors import CaseError
 from ...joints.base import triad
@@ -22,7 +22,7 @@ from ..xml.element import ZEROS, Apart, Element, words
 from .graph import Freedom, Graph, Joint
 from .loop_files import read_loop_files
 from .masses import mass_in
-from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
+from .place import AXES, ORIGIN, Place, euler_turn, unit_quaternion
 from .robot_elements import (
     BALL,
     BUSHING,
@@ -92,8 +92,6 @@ APART = Apart(
     },
 )
 """Names of URDF without meaning for kinematics."""
-
-_AXES = {"x": X, "y": Y, "z": Z}
 
 
 def read_urdf(root: Element) -> Tree:
@@ -276,7 +274,7 @@ class _Robot:
             case "floating" if links[0] in graph.fixed:
                 return Joint(name, links, (), element, is_free=True)
             case "floating":
-                freedoms = [(f".{each}", "slide", place.direction(a)) for each, a in _AXES.items()]
+                freedoms = [(f".{each}", "slide", place.direction(a)) for each, a in AXES.items()]
                 freedoms.append(("", "ball", X))
             case "planar":
                 freedoms = planar(*triad((*axis(),)))
@@ -288,7 +286,7 @@ class _Robot:
                 axes = enumerate((X, Y), 1)
                 freedoms = [(f".{k}", "hinge", place.direction(a)) for k, a in axes]
             case _:  # of a file beside: a universal joint, by the letters of its axes
-                letters = {each: _AXES[each.lower()] for each in kind}
+                letters = {each: AXES[each.lower()] for each in kind}
                 freedoms = [(f"_{k}", "hinge", place.direction(a)) for k, a in letters.items()]
         return Joint.of(name, links, place.at, freedoms, element, _limit(element))
 
@@ -434,7 +432,7 @@ def _origin(element: Element | None) -> Place:
 
 def _pose(element: Element) -> Place:
     at, angles = (element.numbers(name, 3, default=ZEROS) for name in POSE)
-    return Place(vec(at), roll_pitch_yaw(angles))
+    return Place(vec(at), euler_turn("zyx", angles[::-1]))
 
 
 def _axis(element: Element, tag: str, place: Place) -> Vec3:

@@ -128,7 +128,7 @@ def inertial(body: Body, at: BodyStates, gravity: Vec3) -> Wrench:
 
 def arm_of_center(body: Body, at: BodyStates) -> Vec3:
     """Return the arm from a body's internal origin to its centre of mass, turned [units]."""
-    return at.poses[body.name].turn(at.frame.arm(body.name, body.center_of_mass or body.origin))
+    return at.poses[body.name].turn(at.frame.arm(body.name, body.center))
 
 
 def acceleration_of_center(body: Body, at: BodyStates) -> Vec3:

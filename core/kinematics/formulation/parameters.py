@@ -52,7 +52,7 @@ def _load_places(mechanism: Mechanism) -> Iterator[LoadPlace]:
         if body.mass != 0.0:
             part = f"bodies.{body.name}"
             yield LoadPlace(part, "mass", (body.mass,), MASS)
-            yield LoadPlace(part, "center_of_mass", body.center_of_mass or body.origin, None)
+            yield LoadPlace(part, "center_of_mass", body.center, None)
     for force in mechanism.forces:
         part = f"forces.{force.name}"
         for each in fields(force):

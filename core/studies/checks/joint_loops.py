@@ -389,7 +389,6 @@ def missing_wrench(probe: Probe, name: str) -> Array:
     body, motion = probe.mechanism.body(name), probe.motion.bodies[name]
     assert motion.v is not None
     assert motion.a is not None
-    assert body.inertia is not None
     centre = _body_point(probe, name, body.center_of_mass)
     force = body.mass * (np.array(GRAVITY) - centre.a)
     inertia, w, w_t = inertia_matrix(body.inertia), motion.v[:, 3:], motion.a[:, 3:]

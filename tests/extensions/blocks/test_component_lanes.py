@@ -161,16 +161,6 @@ def test_component_joint_settings_stay_numbers(beside):
     assert_alike(own, plain)
 
 
-def test_chain_of_200_loops():
-    loops = 200
-    turn = np.linspace(-0.3, 0.3, 33)
-    found = solve_components(chain(loops), Path({"turn": Ramp(1.0)}, turn), ("end",))
-    assert found.solved.all(), found.message
-    assert found.residual <= 1e-15
-    # the end is two hundred metres away: its coordinates round at 1.4e-14 m
-    assert errors(found.points["end"], chain_end(loops, turn))[0] <= 3e-14
-
-
 PATH = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10))
 
 

@@ -30,7 +30,6 @@ from kincheck.core.extensions.blocks.sparse_lu import Blocks
 from kincheck.core.extensions.blocks.sweep import Lanes
 from kincheck.core.extensions.designs.design_batch import solve_designs
 from kincheck.core.extensions.laboratory.bench.size import LEAN, circle, pivot, ring
-from kincheck.core.harness.record import Results
 from kincheck.core.kinematics.formulation.acceptance_criteria import least_slope
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import frames
@@ -39,7 +38,6 @@ from kincheck.core.kinematics.formulation.state_vectors import jacobian
 from kincheck.core.kinematics.structure.degrees_of_freedom import NullSpaces
 from kincheck.core.mechanism.motions import Path, Ramp
 
-from ...report.page import report
 from ...support.block_structures import chain_of_hinges, solve_sparse
 from ...support.fakes import calls
 from ...support.mechanisms import (
@@ -55,7 +53,6 @@ from ...support.mechanisms import (
     planar_four_bar,
     solve_all,
 )
-from ...support.strut_results import record
 
 CRANKS = 5
 """A small ring is solved as one sparse system on request; the front door does so from 40 bodies."""
@@ -202,15 +199,6 @@ def test_sparse_gap_ends_motion(shape):
     assert "cannot be followed beyond" in found.message
 
 
-@pytest.mark.parametrize("ends", ["distance", "hinges"])
-def test_largest_block_is_followed(ends):
-    turn = np.linspace(0.0, 0.8, 9)
-    found = swept(inside(0.0, ends), turn)
-    assert found.solved.all(), found.message
-    tip, *_ = crank_tip(pivot(2, CRANKS), LEAN - turn)
-    assert np.abs(found.points["tip2"].position - tip).max() <= 1e-13
-
-
 def test_sigmas_of_blocks():
     """Of blocks solved one after the other: of one row exact, of others the better the more
     singular they are.
@@ -285,39 +273,6 @@ def test_designs_of_large_ring():
     found = solve_designs(whole, "turn", [0.1, 3.0], {"joints.pivot0.point": [hinge]}, order=order)
     assert found.solved.tolist() == [[True, False]]
     assert "cannot be followed beyond turn = " in found.messages[0]
-
-
-def test_gear_on_large_ring():
-    """As one program 47 bodies take seventeen seconds to be made ready."""
-    whole = ring(24)
-    geared = replace(
-        whole,
-        bodies=[*whole.bodies, Body("wheel")],
-        joints=[*whole.joints, Revolute("shaft", "ground", "wheel", (-2.0, 0.0, 0.0), Z)],
-        points=[Point("rim", "wheel", (-1.0, 0.0, 0.0))],
-        couplers=[Gear("gear", ("shaft", "pivot12"), ratio=-2.0)],
-    )
-    turn = np.linspace(-0.4, 0.4, 9)
-    found = solve_all(geared, "turn", turn)
-    assert "factor_entries" in found.details
-    s, c, o = np.sin(-2.0 * turn), np.cos(-2.0 * turn), 0.0 * turn
-    expected = np.column_stack([c - 2.0, s, o]), -2.0 * np.column_stack([-s, c, o])
-    assert (errors(found.points["rim"], expected) <= [1e-14, 1e-13]).all()
-
-
-@pytest.mark.parametrize(("rod", "end"), [(1.000001, 2.0), (0.99999, 1.098176)])
-def test_sparse_kite_beside_corner(rod, end):
-    """On the driven crank of a ring a kite on its side, on hinges: three rows more than are
-    needed.
-    """
-    sizes, start, turn = (1.0, 1.2, rod, 1.2), -1.1, np.linspace(0.0, 1.6, 9)
-    _, meet = pin_meeting(*sizes, start + turn)
-    found = solve(four_bar(sizes, start, "hinges", 22), "turn", turn)
-    assert "factor_entries" in found.details
-    assert found.solved.sum() >= 6
-    assert not found.solved[turn > end].any()
-    assert np.abs(found.points["meet"].position - meet)[found.solved].max() < 1e-12
-    assert found.solved.all() or "singular pose ahead" in found.message
 
 
 def stretched(crank, rod, angle):
@@ -480,21 +435,3 @@ def test_cache_keeps_last_large_mechanism(large, kind, monkeypatch):
     with ThreadPoolExecutor(1) as threads:
         threads.submit(solve, large, driver, values).result()
     assert len(made) == 2
-
-
-@pytest.mark.parametrize("mechanism", [chain(21), ring(24)], ids=["components", "sparse"])
-def test_page_of_large_mechanism_has_programs(mechanism, tmp_path):
-    """What the native engine really tells of them."""
-    details = solve(mechanism, "turn", [0.0], points=()).details
-    assert ("components" in details) != ("factor_entries" in details)
-    page = report(
-        Results(
-            run={},
-            records=[record("large", "consensus_only", "native", 0.0, [0.0], details=details)],
-        ),
-        tmp_path,
-    )
-    for name, size in details["program"].items():
-        assert name in page.text
-        assert str(size["flops"]) in page.text
-    assert details["dof_account"]["paper"].replace("-", "−") in page.text

@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 from kincheck.core import (
     Body,
-    Distance,
     JointAngle,
     Mechanism,
-    PointCoordinate,
     Revolute,
     SolveError,
-    Spherical,
     Translational,
     solve,
 )
@@ -32,22 +29,18 @@ from scipy.sparse import linalg
 
 from ...support.block_structures import (
     assert_alike,
-    chain_of_hinges,
     solve_as,
     solve_sparse,
     with_one_program,
 )
 from ...support.loaded_slider_crank import loaded
 from ...support.mechanisms import (
-    X,
     Z,
-    chain,
     crank_tip,
     errors,
     four_bar,
     gears,
     mcpherson,
-    slider_crank,
 )
 
 
@@ -135,16 +128,6 @@ def test_ring_factors_grow_linearly():
     assert large < 4.4 * small
 
 
-def test_redundant_rows_of_many_loops():
-    loops = 60
-    found = solve_sparse(chain_of_hinges(loops), turning(-0.5, 0.5), ["end"])
-    assert found.solved.all(), found.message
-    assert len(found.details["dof_account"]["redundant_rows"]) == 3 * loops
-    assert found.details["redundant_residual"] <= 1e-15
-    expected = [[loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0] for turn in (-0.5, 0.5)]
-    assert np.abs(found.points["end"].position - expected).max() <= 1e-15 * loops
-
-
 def test_ring_samples_are_factored_together(monkeypatch):
     calls, splu = [], linalg.splu
     monkeypatch.setattr(
@@ -206,52 +189,6 @@ def test_tilted_hinge_has_one_verdict():
     for method in (Method.ONE_PROGRAM, Method.SPARSE):
         with pytest.raises(SolveError, match=r"0 degrees of freedom .* but 1 driver"):
             solve_as(method, replace(mechanism, joints=joints), turning(0.5))
-
-
-CHAIN, STRUT, STRETCHED = chain(40), mcpherson(), slider_crank()
-ROD = [
-    Spherical("inner", "chassis", "rod", (1.14, 0.355, 0.1455)),
-    Spherical("outer", "knuckle", "rod", (1.115, 0.665, 0.118)),
-]
-REFUSED = [
-    (
-        replace(CHAIN, drivers=()),
-        r"1 degree of freedom .* but 0 drivers; what can still move is most of all 'crank0', ",
-    ),
-    (
-        replace(CHAIN, drivers=[*CHAIN.drivers, JointAngle("second", "pivot20")]),
-        r"1 degree of freedom .* but 2 drivers; not independent are .*'second'",
-    ),
-    (
-        replace(STRETCHED, drivers=[PointCoordinate("push", "end", X)]),
-        r"driven by 'push' it does not move .*dead centre",
-    ),
-    (
-        replace(
-            STRUT,
-            joints=[
-                each.changed(length=3.0) if isinstance(each, Distance) else each
-                for each in STRUT.joints
-            ],
-        ),
-        "does not close at the design position: residual",
-    ),
-    (Mechanism("still", [Body("wall", fixed=True)], []), "no body can move"),
-    (
-        replace(
-            STRUT,
-            bodies=[*STRUT.bodies, Body("rod")],
-            joints=[*(each for each in STRUT.joints if not isinstance(each, Distance)), *ROD],
-        ),
-        r"but 1 driver; 'rod' can turn; .*use distance",
-    ),
-]
-
-
-@pytest.mark.parametrize(("mechanism", "message"), REFUSED, ids=lambda each: str(each)[:30])
-def test_sparse_refusals_name_cause(mechanism, message):
-    with pytest.raises(SolveError, match=message):
-        SparseLanes(mechanism, Request(tuple(each.name for each in mechanism.drivers), ()))
 
 
 def test_component_programs_ignore_masses():

@@ -10,7 +10,6 @@ from kincheck.core.extensions.hardpoints.suspension import Side
 from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 
 from ...support.case_texts import refused
-from ...support.rods_of_templates import solved
 from ...support.suspension_files import strut_of_table
 
 TRAVEL = np.arange(-50, 51, 10)
@@ -134,21 +133,3 @@ def test_right_wheel_takes_right_columns(tmp_path, car):
     lines += [f"{x},9.9,{y:.5f}" for x, y in zip(TRAVEL, TOE, strict=True)]
     case, _ = curve(tmp_path, replace(car, outputs=(toe,)), lines)
     np.testing.assert_allclose(np.degrees(case.reference["toe"].position), TOE, atol=1e-5)
-
-
-@pytest.fixture(scope="module", params=[11, 17])
-def sampled(request, car, tmp_path_factory):
-    """The case by other samples, with its toe by both."""
-    fine = strut_of_table(tmp_path_factory.mktemp("fine"), f"0.05:{request.param}")
-    return fine, solved(fine)["toe"], np.degrees(solved(car)["toe"])
-
-
-@pytest.mark.parametrize("decimals", range(6))
-def test_rounded_curve_is_within_digits(tmp_path, sampled, decimals):
-    """The curve of the case itself, at its samples and between rows, is off by the rounding."""
-    fine, expected, toe = sampled
-    lines = ["Wheel travel [mm],Toe [deg]"]
-    lines += [f"{x},{y:.{decimals}f}" for x, y in zip(TRAVEL, toe, strict=True)]
-    case, _ = curve(tmp_path, fine, lines)
-    known = case.reference["toe"]
-    assert (np.abs(expected - known.position) <= known.uncertainty["position"] + 1e-12).all()

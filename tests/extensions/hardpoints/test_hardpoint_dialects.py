@@ -12,7 +12,6 @@ from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
-from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from ...support.case_texts import complains, rows, write
 
@@ -160,30 +159,6 @@ def test_omitted_rows_and_columns_are_listed(tmp_path):
     text = "Front suspension\n" + table("Name;X;Y;Z;Mass;", "{};{};{};{};3;")
     source = read(tmp_path, text).source
     assert source.endswith(f"{LEFT_OUT}line 1 (Front suspension), column Mass")
-
-
-def test_strut_table_with_optimumk_names(tmp_path):
-    names = {"lca_front": "CHAS_LowFor", "lca_rear": "CHAS_LowAft", "lca_outer": "UPRI_LowPnt"}
-    rows = {names.get(name, name): at for name, at in TEMPLATES["mcpherson"].sample.items()}
-    file = tmp_path / "car.csv"
-    file.write_text(table("name;x [m];y [m];z [m]", points=rows))
-    by_role = Supplied("mcpherson", axes="iso")
-    theirs = load(file, by_role).mechanism
-    file.write_text(table("name;x [m];y [m];z [m]", points=TEMPLATES["mcpherson"].sample))
-    assert theirs == load(file, by_role).mechanism
-
-
-def test_omitted_points_and_settings_are_listed(tmp_path):
-    listed = read(tmp_path, DIALECTS["configuration below"]).source.split(LEFT_OUT)[1]
-    assert listed == "line 11 (Steering rack,XXXX), line 12 (Wheelbase,1550)"
-    listed = read(tmp_path, DIALECTS["both sides"]).source.split(LEFT_OUT)[1]
-    assert listed.split(", ") == [*RIGHT]
-
-
-def test_mirrored_axes_read_right_points(tmp_path, plain):
-    text = table(points={name: (x, -y, z) for name, (x, y, z) in POINTS.items()})
-    said = Supplied("double_wishbone", "mm", "rearward,left,up")
-    assert read(tmp_path, text, said).mechanism == plain
 
 
 def test_row_without_remark_is_read(tmp_path):

@@ -10,12 +10,10 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 from kincheck.core.extensions.hardpoints.reader import read_hardpoints
-from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 
 from ...support.case_texts import complains, line_with, rows, write
 from .test_hardpoint_dialects import POINTS, comma, table
-from .test_workbooks import book
 
 SAID = Supplied("double_wishbone", "mm", "rearward,right,up")
 
@@ -116,12 +114,6 @@ def test_hardpoint_forms_read_alike(tmp_path, plain, kind):
     assert found == plain
 
 
-def test_sheet_with_coordinate_per_row(tmp_path, plain):
-    rows = [[f"{n}_{a}", x] for n, at in POINTS.items() for a, x in zip("xyz", at, strict=True)]
-    file = book(tmp_path, {"a": [["Hardpoint", "Value [mm]"], *rows], "b": [["x"]]})
-    assert load(file, replace(SAID, units=None)).mechanism == plain
-
-
 def test_json_keys_template_units_axes(tmp_path, plain):
     keys = {"type": "double_wishbone", "units": "mm", "axes": "rearward,right,up", "side": "left"}
     file = write(tmp_path, json.dumps({**keys, "hardpoints": tree()}), "car.json")
@@ -180,15 +172,6 @@ def test_spin_axis_direction_is_omitted(tmp_path):
     text = json.dumps({**NESTED, "wheel": NESTED["wheel"] | {"spin_axis": [0, 1, 0]}})
     case = load(write(tmp_path, text, "car.json"), SAID)
     assert "wheel.spin_axis" in case.source
-
-
-def test_rocker_axis_point_is_read(tmp_path):
-    """Of the rocker, or of the wheel."""
-    points = {name: list(at) for name, at in TEMPLATES["pushrod_knuckle"].sample.items()}
-    file = write(tmp_path, json.dumps({"points": points}), "car.json")
-    case = load(file, Supplied("pushrod_knuckle", "m", "iso"))
-    assert "rocker_axis" in points
-    assert "left out: nothing" in case.source
 
 
 TEXTS = {

@@ -150,12 +150,6 @@ def test_hardpoint_table_states_units_and_axes(tmp_path, head):
     assert_is_adams(tmp_path, table(adams_points(), head), "")
 
 
-def test_hardpoint_table_semicolons_and_prefixes(tmp_path):
-    points = {f"hpl_{name}": place for name, place in adams_points().items()}
-    points["hpl_Wheel Centre"] = points.pop("hpl_wheel_center")
-    assert_is_adams(tmp_path, table(points).replace(",", ";"), "units=mm axes=adams")
-
-
 def test_adams_right_side_is_omitted(tmp_path):
     head = "$----------------------------------------------------------------------PARAM"
     broken = " 'lca_outer                   '  'right       '    267.0      750.0      130.0\n$"
@@ -250,13 +244,6 @@ other columns | x_value    y_value | x_value    r_value | line 15 ... r_value
 @pytest.mark.parametrize(("old", "new", "message"), rows(ADAMS_FAULTS))
 def test_adams_hardpoint_faults(tmp_path, old, new, message):
     complains(edited(tmp_path, ADAMS, (old, new)), message, Supplied(WISHBONE, ask_names=True))
-
-
-def test_adams_truncated_hardpoints_are_refused(tmp_path):
-    file = tmp_path / ADAMS.name
-    file.write_text(ADAMS.read_text().split(" 'uca_rear")[0])
-    missing = "missing uca_rear, the upper arm's rear pivot ... wheel_center, the wheel's centre"
-    complains(file, missing, Supplied(WISHBONE))
 
 
 TABLE_FAULTS = """

@@ -15,55 +15,6 @@ from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from ...oracles.rods import rotation
 from ...support.rods_of_templates import RODS, solved
 
-STEP = 1e-5
-"""Half a difference [m]: its square, and round-off over it, are below the tolerance."""
-BALLS = {"mcpherson": (), "three_link": ("arm_pivot",), "semi_trailing_arm": ("arm_inner",)}
-
-
-def angles_of(name, role, shift, spin):
-    """Toe, camber and caster with the joint of a role shifted: inner ends on the chassis, outer
-    ones on the carrier.
-    """
-    at = {each: np.array(place) for each, place in TEMPLATES[name].sample.items()}
-    rods, center = RODS.get(name, ()), at["wheel_center"]
-    on_body, on_carrier = dict(at), dict(at)
-    outer = {end for _, end in rods}
-    (on_carrier if role in outer else on_body)[role] = at[role] + shift
-
-    def moved(pose):
-        return {
-            each: center + pose[:3] + rotation(pose[3:]) @ (place - center)
-            for each, place in on_carrier.items()
-        }
-
-    def misfit(pose):
-        now = moved(pose)
-        found = [pose[2]]
-        for a, b in rods:
-            found.append(np.linalg.norm(now[b] - on_body[a]) - np.linalg.norm(at[b] - at[a]))
-        if name == "mcpherson":
-            axis = rotation(pose[3:]) @ (at["strut_upper"] - at["strut_lower"])
-            away = on_body["strut_upper"] - now["strut_lower"]
-            found += np.cross(axis / np.linalg.norm(axis), away).tolist()
-        for ball in BALLS.get(name, ()):
-            found += (now[ball] - on_body[ball]).tolist()
-        if name == "semi_trailing_arm":
-            axis = on_body["arm_outer"] - on_body["arm_inner"]
-            away = now["arm_outer"] - on_body["arm_outer"]
-            found += np.cross(axis / np.linalg.norm(axis), away).tolist()
-        return np.array(found)
-
-    pose = np.zeros(6)
-    for _ in range(6):
-        jacobian = [(misfit(pose + d) - misfit(pose - d)) / 2e-6 for d in 1e-6 * np.eye(6)]
-        pose = pose - np.linalg.lstsq(np.transpose(jacobian), misfit(pose), rcond=None)[0]
-    s = rotation(pose[3:]) @ spin
-    angles = [np.arctan2(s[0], s[1]), -np.arcsin(s[2])]
-    if (ends := TEMPLATES[name].kingpin) and isinstance(ends[0], str):
-        low, high = ((moved(pose) if end in outer else on_body)[end] for end in ends)
-        angles.append(np.arctan2(low[0] - high[0], high[2] - low[2]))
-    return np.array(angles)
-
 
 def write_table(folder, name, toe, camber, moved):
     """Write the sample table of a template, x rearward and y right; return the wheel's axis."""
@@ -78,23 +29,6 @@ def write_table(folder, name, toe, camber, moved):
     lines += [f"{role},{-x!r},{-y!r},{z!r}" for role, (x, y, z) in sample.items()]
     (folder / "car.csv").write_text("\n".join(lines) + "\n")
     return spin
-
-
-@pytest.mark.parametrize("name", [*RODS])
-@pytest.mark.by_day(4)
-@pytest.mark.parametrize("angles", [(0.3, -2.0), (0.0, 0.0)])
-def test_template_shims_equal_differences(tmp_path, name, angles):
-    toe, camber = map(math.radians, angles)
-    spin = write_table(tmp_path, name, toe, camber, {})
-    found = {each.roles[0]: each.shim for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
-    checked = [role for role, shim in found.items() if shim is not None]
-    ends = {end for rod in RODS[name] for end in rod}
-    assert ends <= {*checked}
-    for role in checked:
-        for k, sign in enumerate((-1.0, -1.0, 1.0)):
-            shift = STEP * sign * np.eye(3)[k]
-            up, down = (angles_of(name, role, way * shift, spin) for way in (1, -1))
-            assert found[role][:, k] == pytest.approx((up - down) / (2 * STEP), abs=1e-6), (role, k)
 
 
 @pytest.mark.parametrize("name", [name for name, rods in RODS.items() if len(rods) > 2])

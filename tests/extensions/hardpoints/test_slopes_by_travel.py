@@ -162,26 +162,6 @@ def test_derivatives_by_travel_at_every_sample(tmp_path, kind):
     assert found.outputs["rc"].velocity is None
 
 
-@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_derivatives_by_travel_in_engines(tmp_path, name):
-    pytest.importorskip(name)
-    case = case_of(tmp_path, SWEEPS["sine"])
-    found, native = answer(case, name), answer(case, "native")
-    for output in case.outputs:
-        off = found.outputs[output.name].position - native.outputs[output.name].position
-        assert np.abs(off).max() < 1e-11
-
-
-def test_roll_centre_slope_equals_difference(tmp_path):
-    """The roll centre by travel, against its difference over two wheel heights."""
-    case = case_of(tmp_path, SWEEPS["both"])
-    slope = answer(case, "native").outputs["rc.per_travel"].position
-    for k in (0, 6):
-        rack, stroke = 0.01 * case.sweep.values[k], 0.02 * case.sweep.values[k]
-        high, low = (expected(rack, stroke + d)["rc"] for d in (1e-5, -1e-5))
-        assert slope[k] == pytest.approx((high - low) / 2e-5, rel=1e-6)
-
-
 def test_slope_without_travel_driver(tmp_path):
     """A reference point of the same carrier is no driver of travel unless it is named."""
     data_path = case_of(tmp_path, SWEEPS["both"])

@@ -169,26 +169,6 @@ def test_reference_signs_must_match():
     refused(lambda: loaded(STRUT, table), told)
 
 
-def test_suspension_in_millimetres_and_degrees():
-    """The same numbers in these units are a thousandth of the metres, and degrees."""
-    rows = [[k / 1000, 0.25, 3.0] for k in range(-80, 81, 5)]
-    data = changed(static_camber=-0.02, center_plane=[0.0, 0.01, 0.0]) | {
-        "outputs": STRUT["outputs"] | {"toe": {"type": "toe", "atol": 0.5, "why": "test"}},
-        "reference": {"columns": ["stroke", "toe", "camber.per_travel"], "rows": rows},
-    }
-    large, small = loaded(data), loaded(data | {"units": {"length": "mm", "angle": "deg"}})
-    degree = np.radians(1.0)
-    (toe,) = [output for output in small.outputs if output.name == "toe"]
-    assert toe.atol == pytest.approx(0.5 * degree)
-    for name, unit in (("toe", degree), ("camber.per_travel", 1e3 * degree)):
-        expected = unit * large.reference[name].position
-        assert small.reference[name].position == pytest.approx(expected, rel=1e-14)
-    lengths = ("wheel_radius", "wheelbase", "cg_height", "middle")
-    for name, unit in {"static_camber": degree, **dict.fromkeys(lengths, 1e-3)}.items():
-        one, two = (getattr(case.outputs[0].vehicle, name) for case in (large, small))
-        assert two == pytest.approx(unit * np.array(one), rel=1e-14)
-
-
 def test_per_travel_false_omits_slopes():
     case = loaded(unreferenced(changed(per_travel=False)) | TOE)
     assert [output.name for output in case.outputs] == ["toe"]

@@ -1,16 +1,18 @@
 """The page that names unnamed points: roles proposed by geometry, saved as a file of names."""
 
 import json
-from urllib.error import HTTPError
-from urllib.request import Request, urlopen
 
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.extensions.live.naming import NamingServer, naming_of
+from kincheck.core.cli.main import registry
+from kincheck.core.extensions.live.command import Serve
+from kincheck.core.extensions.live.naming import naming_of
+from kincheck.core.extensions.live.server import LiveServer
 
 from ...support.case_texts import write
 from ..hardpoints.test_guess import RACE, places, plain, rows
+from .conftest import ASKED, TOLD, page_of
 
 TEXT = "name;x;y;z\n" + rows("numbers", "P{};{};{};{}")
 TRUE = {role: f"P{k}" for k, role in enumerate(RACE, 1)}
@@ -18,36 +20,34 @@ TRUE = {role: f"P{k}" for k, role in enumerate(RACE, 1)}
 
 @pytest.fixture
 def server(tmp_path):
-    guess = naming_of(write(tmp_path, TEXT, "car.csv"), Supplied())
-    made = NamingServer(guess)
+    file = write(tmp_path, TEXT, "car.csv")
+    read = Serve(file)._reader(registry(), named=True)
+    made = LiveServer(file, read, [], None)
     yield made
     made.close()
 
 
-def ask(server, path, names=None, token=None, **headers):
-    token = server.token if token is None else token
-    address = f"{server.address.partition('?')[0]}{path}?token={token}"
-    data = None if names is None else json.dumps(names).encode()
-    try:
-        with urlopen(Request(address, data, headers), timeout=10.0) as answer:
-            return answer.status, answer.read().decode()
-    except HTTPError as error:
-        return error.code, error.read().decode()
+def ask(socket, **message):
+    """Return the answer to a message, or the first message of a page without one."""
+    if message:
+        ASKED.validate(message)
+        socket.send(json.dumps(message))
+    told = json.loads(socket.recv(timeout=60))
+    TOLD.validate(told)
+    return told
 
 
-def test_page_proposes_roles_and_saves(server, tmp_path):
-    status, text = ask(server, "points")
-    found = json.loads(text)
-    assert status == 200
-    assert {each["name"]: each["point"] for each in found["roles"] if each["point"]} == TRUE
-    at = next(each["at"] for each in found["points"] if each["name"] == "P9")
-    assert at == pytest.approx([1e-3 * x for x in RACE["wheel_center"]])
-    assert ask(server, "names", TRUE) == (200, str(tmp_path / "car_names.toml"))
-    assert server.saved.wait(5.0)
-    said = Supplied("double_wishbone", "mm", "iso", names=tmp_path / "car_names.toml")
+def test_page_proposes_roles_and_saves(server, tmp_path, capsys):
+    with page_of(server) as socket:
+        found = ask(socket)
+        assert {each["name"]: each["point"] for each in found["roles"] if each["point"]} == TRUE
+        at = next(each["at"] for each in found["points"] if each["name"] == "P9")
+        assert at == pytest.approx([1e-3 * x for x in RACE["wheel_center"]])
+        names = tmp_path / "car_names.toml"
+        assert ask(socket, type="names", roles=TRUE)["name"] == str(names)
+    assert "car_names.toml is written. Next time, add: " in capsys.readouterr().err
+    said = Supplied("double_wishbone", "mm", "iso", names=names)
     assert places(load(tmp_path / "car.csv", said)) == places(plain(tmp_path, RACE))
-    server.follow("http://127.0.0.1:1/")
-    assert ask(server, "next") == (200, '"http://127.0.0.1:1/"')
 
 
 @pytest.mark.parametrize(
@@ -59,17 +59,25 @@ def test_page_proposes_roles_and_saves(server, tmp_path):
     ],
 )
 def test_answers_that_cannot_be(server, tmp_path, changed, message):
-    status, text = ask(server, "names", TRUE | changed)
-    assert status == 400
-    assert message in text
+    with page_of(server) as socket:
+        ask(socket)
+        assert message in ask(socket, type="names", roles=TRUE | changed)["message"]
     assert not (tmp_path / "car_names.toml").exists()
 
 
-def test_requests_of_others_are_refused(server):
-    assert ask(server, "points", token="x")[0] == 403
-    assert ask(server, "names", TRUE, Origin="http://elsewhere.example")[0] == 403
-    assert ask(server, "", Host="elsewhere.example")[0] == 403
-    assert ask(server, "other")[0] == 404
+def test_page_goes_on_when_named(server, browser):
+    browser.visit(server.address)
+    browser.click("#save")
+    browser.until("window.kincheckLive && kincheckLive.answer")
+    assert browser.run("return kincheckLive.rows().length") == len(RACE)
+    assert browser.complaints() == []
+
+
+def test_page_of_names_checks_nothing(server):
+    with page_of(server) as socket:
+        ask(socket)
+        told = ask(socket, type="check", engines=["native"])["message"]
+    assert told == "a table without roles has no answer to 'check'"
 
 
 def test_named_table_needs_no_page(tmp_path):

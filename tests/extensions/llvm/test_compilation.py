@@ -17,7 +17,6 @@ from kincheck.core.kinematics.compiled import compiled_model as models
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
-from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import Plan, Program, Tape, program
@@ -27,15 +26,6 @@ from ...support.mechanisms import chain, four_bar, mcpherson
 from .test_bytecode import every_slot
 
 pytestmark = pytest.mark.usefixtures("no_programs_kept")
-
-
-def test_sweep_is_equal_after_compilation():
-    model = compile_model(mcpherson(), Request(("stroke",), ("wheel",)))
-    route = Route(model, Path({"stroke": Ramp(1.0)}, np.linspace(-0.08, 0.08, 161)))
-    first, *others = (follow(route, 1e-12).points["wheel"].position for _ in range(10))
-    assert not model._bind.args[0].interpreted
-    for each in others:
-        np.testing.assert_array_equal(each, first)
 
 
 def test_single_sweep_is_interpreted():

@@ -187,19 +187,6 @@ def test_extrapolation_after_long_step(lanes, monkeypatch):
     assert (iterations[-40:] == 1).all()
 
 
-@pytest.mark.usefixtures("eight_lanes")
-@pytest.mark.parametrize("order", [0, 2])
-def test_extrapolation_where_grid_gets_fine(order):
-    """Long steps are taken one by one; from the first group that is accepted whole, machine code
-    goes on to a multiple of eight, numpy from there.
-    """
-    angles = np.concatenate([[0.5, 1.0, 1.5], 1.5 + 0.002 * np.arange(1.0, 62.0)])
-    numpy, machine = (crank_motion(angles, order, compiled=each).tolist() for each in (False, True))
-    assert numpy[:3] == machine[:3] == [3, 3, 3]
-    assert numpy[-40:] == machine[-40:] == [1] * 40
-    assert sum(numpy) <= sum(machine)
-
-
 def test_whole_turn_takes_few_programs(monkeypatch):
     """By numpy each run of a program takes as long, however many lanes are of use: a group goes as
     far as lanes are accepted, and its iteration ends with them.

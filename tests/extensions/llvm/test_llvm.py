@@ -140,18 +140,6 @@ def test_machine_code_models_equal_numpy(style):
             assert np.abs(a.acceleration - b.acceleration).max() <= 2e-13
 
 
-def test_unreached_sample_message_in_both_executors():
-    mechanism = mcpherson()
-    messages = []
-    for compiled in (False, True):
-        request = Request((mechanism.drivers[0].name,), (), compiled=compiled)
-        path = Path({mechanism.drivers[0].name: Ramp(1.0)}, np.array([0.0, 0.2, 0.6]))
-        trajectory = sweep(compile_model(mechanism, request), path, 1e-12)
-        assert trajectory.solved.tolist() == [True, True, False]
-        messages.append(trajectory.message.split(":")[0][:60])
-    assert messages[0] == messages[1]
-
-
 def test_numpy_executor_without_llvmlite(monkeypatch):
     monkeypatch.setattr("kincheck.core.program.executor.compiler", lambda: None)
     mechanism = four_bar()

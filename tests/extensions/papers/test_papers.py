@@ -9,9 +9,9 @@ import pytest
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.extensions.papers import browser
-from kincheck.core.extensions.papers.drawing import svg
 from kincheck.core.extensions.papers.paper import paper_of
 from kincheck.core.extensions.papers.summary import summary
+from kincheck.core.extensions.reports.svg import svg
 from kincheck.core.harness.record import to_json
 from kincheck.core.report.sections import Report, Section
 from msgspec.structs import replace

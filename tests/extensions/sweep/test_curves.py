@@ -102,36 +102,6 @@ AXLES = [
 ]
 
 
-@pytest.mark.by_day(8)
-@pytest.mark.parametrize("axle", AXLES, ids=str)
-def test_curves_of_asymmetric_axle_equal_run(tmp_path, axle):
-    """Every place of the case moves by itself, so that left and right differ."""
-    name, motion = axle
-    case = load(table(tmp_path, name), Supplied(travel="0.02:5", axle=motion, **VEHICLE))
-    known = places(case.mechanism)
-    own = [
-        f"{place} {axis}"
-        for place, value in known.items()
-        if place.startswith("joints.left") and len(value) == 3 and ".ax" not in place
-        for axis in "xyz"
-    ]
-    plain = replace(case, hardpoints=())
-    geometry = dict.fromkeys(own)
-    offsets = np.random.default_rng(7).normal(size=(1, len(geometry))) * 5e-4
-    found = kincheck.curves(plain, [*geometry], offsets)
-    moved = {place: [*value] for place, value in known.items()}
-    together = Geometry(plain)
-    for number, offset in zip(geometry, offsets[0], strict=True):
-        place, axis = number.split(" ")
-        for each, slopes in together.variable(place).moves.items():
-            moved[each] = moved[each] + slopes[:, "xyz".index(axis)] * offset
-    expected = run_alone(replace(plain, mechanism=placed(plain.mechanism, moved)))
-    assert found.solved.all()
-    assert_equal(found, 0, expected)
-    if motion == "steer":  # straight wheels at design
-        assert "straight" in found.reasons["ackermann"]
-
-
 def along_sweep(output):
     """An output of wheels that travel along the sweep alone, which drivers of their own give else:
     in heave both are the same, and proofs have no drivers that move alone.

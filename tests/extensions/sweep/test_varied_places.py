@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import CaseError, solve_designs
+from kincheck.core import CaseError
 from kincheck.core.case.case import HELD_BUT
 from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.io.reader_options import Supplied
@@ -194,17 +194,6 @@ def test_row_moves_follow_table_axes(tmp_path):
     assert by_number[0]["lca_outer y"] == pytest.approx(by_number[1]["lca_outer z"])
 
 
-def test_arm_axis_follows_its_two_rows(tmp_path):
-    case = mcpherson(tmp_path)
-    ends = {"front": {"at": "lca_front", "sigma": 1.0}, "rear": {"at": "lca_rear", "sigma": 1.0}}
-    variation = vary(tmp_path, case, **ends)
-    places = {"joints.lca_pivot.point", "joints.lca_pivot.axis"}
-    assert set(variation.places) == places
-    found = moved(variation, front__z=2e-3, rear__z=0.5e-3)
-    assert [*found["joints.lca_pivot.axis"]] == pytest.approx([0.0, 0.0, 1.5e-3], abs=1e-15)
-    assert [*found["joints.lca_pivot.point"]] == pytest.approx([0.0, 0.0, 0.5e-3], abs=1e-15)
-
-
 @pytest.mark.parametrize("at", ["lca_outer", "lower_ball", "joints.lower_ball.point", "Kugel"])
 def test_row_by_role_joint_or_place(tmp_path, at):
     """The user's own name of the row, its role, and the names of places as before."""
@@ -219,35 +208,6 @@ def test_row_by_role_joint_or_place(tmp_path, at):
     numbers = {each.number for each in diagnose(case, samples=1, tol=1e-12).sensitivities}
     assert {"Kugel x", "lca_front z"} <= numbers
     assert not any("." in number for number in numbers)
-
-
-def test_row_moves_both_axle_sides(tmp_path):
-    case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), replace(CORNER, axle="heave"))
-    found = moved(vary(tmp_path, case, ball={"at": "lca_outer", "sigma": 1.0}), ball__y=1e-3)
-    assert [*found["joints.left_lower_ball.point"]] == pytest.approx([0, 1e-3, 0], abs=1e-15)
-    assert [*found["joints.right_lower_ball.point"]] == pytest.approx([0, -1e-3, 0], abs=1e-15)
-
-
-def test_python_designs_move_rows(tmp_path):
-    """The places that follow, for `solve_designs`, against the table moved."""
-    rows = rows_of("double_wishbone")
-    case = load(table(tmp_path, "double_wishbone", rows), CORNER)
-    offsets = {"uca_rear": [[0.0, 0.0, 0.0], [1e-3, 0.0, -2e-3]], "wheel_axis": np.zeros((2, 3))}
-    places = case.geometry(offsets)
-    found = solve_designs(case.mechanism, "stroke", case.sweep.values, places)
-    for k, (x, z) in enumerate(((0, 0), (1, -2))):
-        there = [
-            [row[0], repr(float(row[1]) + x), row[2], repr(float(row[3]) + z)]
-            if row[0] == "uca_rear"
-            else row
-            for row in rows
-        ]
-        again = solved(load(table(tmp_path, "double_wishbone", there), CORNER))
-        for axis in range(3):
-            own = found.points["lca_outer"].position[k][:, axis]
-            np.testing.assert_allclose(own, again[f"lca_outer.{'xyz'[axis]}"], atol=CLOSE)
-    with pytest.raises(CaseError, match="did you mean 'uca_rear'"):
-        case.geometry({"uca_rar": np.zeros((2, 3))})
 
 
 FAULTS = [
@@ -275,21 +235,6 @@ def test_invalid_row_is_refused(tmp_path, points, message):
     with pytest.raises(CaseError) as caught:
         vary(tmp_path, case, **points)
     assert message in str(caught.value)
-
-
-def test_line_of_following_axis_is_accepted(tmp_path):
-    """Variation files of tables had to state it, when axes did not follow by themselves."""
-    case = mcpherson(tmp_path)
-    ends = {"foot": {"at": "strut_lower", "sigma": 1.0}, "top": {"at": "strut_top", "sigma": 1.0}}
-    line = {"axis": "joints.strut_slide.axis", "through": ["strut_slide", "strut_top"]}
-    offsets = {"foot__x": 1e-3, "top__y": 2e-3}
-    found = moved(vary(tmp_path, case, tables={"lines": {"strut": line}}, **ends), **offsets)
-    for place, change in moved(vary(tmp_path, case, **ends), **offsets).items():
-        np.testing.assert_allclose(found[place], change, atol=1e-15)
-    other = {"axis": "joints.strut_slide.axis", "through": ["strut_top", "strut_slide"]}
-    axis = {"at": "joints.strut_slide.axis", "sigma": 0.1}
-    with pytest.raises(CaseError, match="varies by itself"):
-        vary(tmp_path, case, tables={"lines": {"strut": other}}, axis=axis)
 
 
 def test_sensitivities_of_table_name_rows(tmp_path, capsys):

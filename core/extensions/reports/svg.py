@@ -269,7 +269,7 @@ def _trace(trace: Figure, x: _Scale, y: _Scale, floor: float | None) -> Iterator
         yield f'<path d="{_line(places)}Z" fill="{trace["fillcolor"]}"/>' if any(places) else ""
         return
     if "lines" in mode:
-        yield _path(_line(places), trace.get("line", {}))
+        yield _path(_line(places), trace.get("line", {}), trace.get("meta", ""))
     if "markers" in mode:
         most = trace.get("marker", {}).get("maxdisplayed", len(places))
         step = math.ceil(len(places) / most) if most else 1
@@ -283,13 +283,14 @@ def _line(places: Sequence[Place | None]) -> str:
     return "".join(f"{'L' if before else 'M'}{at[0]:.1f} {at[1]:.1f}" for before, at in pairs if at)
 
 
-def _path(d: str, look: Figure) -> str:
+def _path(d: str, look: Figure, name: str = "") -> str:
     dash: str = look.get("dash") or "solid"
     dashes = DASHES.get(dash, dash).replace("px", "")
     dashed = f' stroke-dasharray="{dashes}"' if dashes else ""
     colour, width = look.get("color", AXIS), look.get("width", 1.5)
     style = f'stroke="{colour}" stroke-width="{width}"{dashed} stroke-linejoin="round"'
-    return f'<path d="{d}" fill="none" {style}/>'
+    title = f"<title>{escape(name)}</title>" if name else ""
+    return f'<path d="{d}" fill="none" {style}>{title}</path>'
 
 
 def _symbol(at: Place, trace: Figure) -> Iterator[str]:
