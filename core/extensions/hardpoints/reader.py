@@ -181,7 +181,7 @@ TREE = HardpointReader(
     "tree of hardpoints",
     suffixes=(".yaml", ".yml", ".py"),
     others=(".json", ".toml"),
-    where="tree:read_tree",
+    where="scripts:read_names",
     claim=_may_be_tree,
 )
 WORKBOOK = HardpointReader(

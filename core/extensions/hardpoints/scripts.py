@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 from ...case.io.document import fault
+from ...case.io.readers import text_of
 from ...case.units import LENGTHS
 from ...errors import brief
 from .options import WheelOptions
@@ -29,6 +30,7 @@ from .tree import (
     fact_leaves,
     facts_of_comments,
     leaves_of,
+    read_tree,
     table_of,
     with_unit,
 )
@@ -53,6 +55,12 @@ Statement: TypeAlias = tuple[ast.stmt, Keys, Targets]
 
 class _Array(list[Any]):
     """An array of numbers: Python calculates with each of them, other than with a list."""
+
+
+def read_names(file: Path, supplied: WheelOptions) -> HardpointTable:
+    """Return the points of a tree of names, or of a script of Python."""
+    read = read_python if file.suffix.lower() == ".py" else read_tree
+    return read(file, text_of(file), supplied)
 
 
 def read_python(file: Path, text: str, supplied: WheelOptions) -> HardpointTable:

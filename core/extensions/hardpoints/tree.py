@@ -19,7 +19,6 @@ from typing import Any, TypeAlias, cast
 
 from ...case.io.document import check_values, fault, parse, parse_json, shown, unknown_name
 from ...case.io.lines import join
-from ...case.io.readers import text_of
 from ...case.io.table import is_number
 from ...case.units import LENGTHS
 from ...errors import brief, remedy, sentence, shortened
@@ -111,8 +110,8 @@ class Leaf:
         return ((*above, split[0]), split[1]) if split else None
 
 
-def read_tree(file: Path, supplied: WheelOptions) -> HardpointTable:
-    """Return the points of a YAML, JSON, TOML or Python file.
+def read_tree(file: Path, text: str, supplied: WheelOptions) -> HardpointTable:
+    """Return the points of a YAML, JSON or TOML file.
 
     Args:
         supplied: section or corner of the tree, if several have points.
@@ -120,11 +119,6 @@ def read_tree(file: Path, supplied: WheelOptions) -> HardpointTable:
     Raises:
         CaseError: no such text, no points, or points of several suspensions.
     """
-    text = text_of(file)
-    if file.suffix.lower() == ".py":
-        from .scripts import read_python
-
-        return read_python(file, text, supplied)
     if file.suffix.lower() == ".json":
         return table_of(file, "JSON", json_tree(file, without_comments(text)), supplied)
     if file.suffix.lower() == ".toml":
