@@ -14,14 +14,14 @@ from kincheck.core import (
     Revolute,
 )
 from kincheck.core import primitives as p
-from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, cross, turned_by
+from kincheck.core.algebra import ZERO, Vec3, X, Y, Z
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
 
 from ..oracles import naive
 from ..support.mechanisms import ORIGIN, solve_all
-from ..support.specimens import LANES, MAKERS, admissible, body, lanes, make, orientation, rotation
+from ..support.specimens import LANES, MAKERS, admissible, body, make, rotation
 
 
 @pytest.fixture
@@ -116,68 +116,6 @@ def test_primitives_with_branch_test(rng):
         p.Dot11,
         p.DrivenAngle,
     ]
-
-
-def newton_from(q, primitive, rows, iterations):
-    """Newton's iteration of body j against the ground, smallest step; the poses it reaches, lane by
-    lane.
-    """
-    for _ in range(iterations):
-        j = Pose.of(ZERO, q)
-        J = np.array([lanes(row) for row in rows(j)]).transpose(2, 0, 1)
-        phi = lanes(primitive.phi(GROUND_POSE, j)).T
-        step = (np.linalg.pinv(J) @ phi[:, :, None])[:, :, 0].T
-        q = turned_by(q, -0.5 * Vec3(*step))
-    return Pose.of(ZERO, q)
-
-
-def simplified(primitive):
-    return lambda j: [row.pj for row in primitive.rows(GROUND_POSE, j)]
-
-
-def exact(primitive):
-    """The exact rows of a condition a . h_j on an axis of the ground: -(a x h_j)."""
-    return lambda j: [-cross(a, j.turn(primitive.h)) for a in (primitive.g, primitive.f)]
-
-
-def test_basin_of_dot12(rng):
-    """From any orientation to the identity; formulation section 4 has the same of RotX with theta =
-    0.
-
-    Of the two quaternions of an orientation, that of the turn below 180 degrees: a march arrives
-    with it.
-    """
-    q = orientation(rng)
-    sign = np.sign(q.e0)
-    reached = newton_from(Quat(sign * q.e0, sign * q.e), p.Dot12(), simplified(p.Dot12()), 5)
-    assert np.abs([*reached.q.e]).max() < 1e-14
-
-
-def test_basin_of_dot11(rng):
-    """From any orientation to h_j = +h_i with the simplified rows; with the exact ones often to
-    -h_i.
-    """
-    q, dot11 = orientation(rng), p.Dot11(X, Y, Z)
-    reached = newton_from(q, dot11, simplified(dot11), 12)
-    assert np.abs(dot11.phi(GROUND_POSE, reached)).max() < 1e-14
-    assert dot11.branch(GROUND_POSE, reached)[0].min() > 0.0
-    astray = newton_from(q, dot11, exact(dot11), 40)
-    assert 0.1 < np.mean(dot11.branch(GROUND_POSE, astray)[0] < 0.0) < 0.9
-
-
-@pytest.mark.parametrize("degrees", [1.0, 30.0, 66.0, 80.0, 100.0, 150.0, 179.0])
-def test_newton_step_of_dot11(degrees):
-    """Isolated, a misalignment a is turned back by 2 atan(sin(a) / 2) with the simplified rows,
-    which always shrinks it, and by 2 atan(tan(a) / 2) with the exact ones: forward, beyond 90
-    degrees. (Turned back by the full angle instead of its tangent, the exact ones fail beyond 66.8
-    degrees; formulation section 3.)"""
-    dot11, a = p.Dot11(X, Y, Z), np.radians(degrees)
-    start = rotation(X, np.full(LANES, a))
-    for rows, tangent in ((simplified, 0.5 * np.sin(a)), (exact, 0.5 * np.tan(a))):
-        once = newton_from(start, dot11, rows(dot11), 1)
-        left = 2.0 * np.arctan2(once.q.e.x, once.q.e0)
-        assert left == pytest.approx(a - 2.0 * np.arctan(tangent), abs=1e-12)
-        assert (np.abs(left) < a).all() == (rows is simplified or degrees < 90.0)
 
 
 def test_driven_angle_over_three_turns():

@@ -9,7 +9,6 @@ import pytest
 from kincheck import cases
 from kincheck.cases import bennett
 from kincheck.cases.jet import Jet
-from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, Universal
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import SIGMA, Request
 from kincheck.core.kinematics.compiled.routes import Route
@@ -21,7 +20,7 @@ from kincheck.core.kinematics.formulation.styles import styles
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 
-from ..support.mechanisms import BRANCH, ORIGIN, Z, chain, chain_end, errors, solve_all
+from ..support.mechanisms import BRANCH, chain, chain_end, errors, solve_all
 from .test_redundancy import LEFT, locomotive, rim
 
 STYLES = styles()
@@ -115,47 +114,6 @@ def test_bifurcation_after_row_exchange(first, turn):
     assert errors(found.points["end"], chain_end(1, turn))[0] <= 1e-12
     assert found.details["rows_chosen_anew"] >= 1
     assert [pose["kind"] for pose in found.details["singular_poses"]] == ["bifurcation"]
-
-
-@pytest.mark.by_day(2)
-@pytest.mark.parametrize(
-    ("style", "off"),
-    [
-        *((style, off) for style in (STYLES[0], STYLES[-1]) for off in (0.003, 0.0044, 0.008)),
-        *zip(STYLES[1:-1], (0.008, 0.003, 0.0044), strict=False),
-    ],
-)
-def test_spherical_kite_beside_corner(off, style):
-    """Rod and rocker are alike, crank and ground nearly so: beside the corner all rows are nearly
-    singular, those kept more so.
-    """
-    alike, ground = 0.98, 0.72
-
-    last = np.array([np.sin(ground), 0.0, np.cos(ground)])
-
-    def pose(angle):
-        over = np.sin(ground + off)
-        pin = np.array([over * np.cos(angle), over * np.sin(angle), np.cos(ground + off)])
-        mean, across = pin + last, np.cross(pin, last)
-        along = np.cos(alike) / (1.0 + pin @ last)
-        return pin, along * mean + np.sqrt(
-            (1.0 - along**2 * (mean @ mean)) / (across @ across)
-        ) * across
-
-    pin, meet = (tuple(each.tolist()) for each in pose(0.9))
-    joints = [
-        Revolute("first", "ground", "crank", ORIGIN, Z),
-        Revolute("last", "ground", "rocker", tuple(last.tolist()), tuple(last.tolist())),
-        Revolute("pin", "crank", "rod", pin, pin),
-        Universal("meet", "rod", "rocker", meet, (meet, tuple(np.cross(pin, meet).tolist()))),
-    ]
-    bodies = [Body(name) for name in ("crank", "rod", "rocker")]
-    kite = Mechanism(
-        "kite", bodies, joints, [Point("meet", "rocker", meet)], [JointAngle("turn", "first")]
-    )
-    turn = np.linspace(0.0, -6.28, 14)
-    found = solve_all(kite, "turn", turn, style=style, order=0)
-    assert errors(found.points["meet"], [[pose(0.9 + each)[1] for each in turn]])[0] < 1e-10
 
 
 # When other rows are looked for, how often, and which are taken

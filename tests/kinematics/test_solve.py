@@ -169,19 +169,6 @@ def test_paper_equations_hold(name, write, style):
         assert np.abs(phi_tt).max() <= 1e-11
 
 
-def test_points_follow_bodies():
-    """Position, velocity and acceleration of a point by the bodies' r, p, omega' alone."""
-    mechanism, found = mcpherson(), solution()
-    arm = naive.arm(naive.design(mechanism)["knuckle"], mechanism.point("rod_end").position)
-    for k in range(0, 161, 20):
-        r, p, v, a = naive.sample(found, k)["knuckle"]
-        A, w, w_t = naive.A(p), naive.tilde(v[3:]), naive.tilde(a[3:])
-        rod_end = found.points["rod_end"]
-        assert rod_end.position[k] == pytest.approx(r + A @ arm, abs=5e-16)
-        assert rod_end.velocity[k] == pytest.approx(v[:3] + A @ w @ arm, abs=5e-15)
-        assert rod_end.acceleration[k] == pytest.approx(a[:3] + A @ (w_t + w @ w) @ arm, abs=5e-14)
-
-
 # A solution has what is asked for and no more, and bad arguments are refused
 
 

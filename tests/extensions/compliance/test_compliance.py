@@ -122,17 +122,6 @@ def test_travel_unit_of_one_end_suffices(tmp_path, travel):
     assert found["loads"]["lateral"]["lateral"] == [-1000.0, 0.0, 1000.0]
 
 
-@pytest.mark.parametrize(
-    ("travel", "first", "count"),
-    [("10mm:3", -0.01, 3), ("10mm", -0.01, 25), ("0", 0.0, 1), ("0:10mm", 0.0, 25)],
-)
-def test_travel_is_spelled_as_in_run(tmp_path, travel, first, count):
-    out = tmp_path / "out.json"
-    assert main(["kc", strut_file(tmp_path), f"--travel={travel}", "--json", str(out)]) == 0
-    found = json.loads(out.read_text())["travel"]
-    assert (found[0], len(found)) == (first, count)
-
-
 def test_kc_constant_load_acts_over_travel(tmp_path):
     """Loads at the contact, as the data have them, with a drive on the wheel carrier."""
     row = STRUT["results"][2]

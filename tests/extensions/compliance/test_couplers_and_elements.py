@@ -25,7 +25,6 @@ from ...support.one_freedom import (
     G,
     effort,
     end,
-    falling,
     hold,
     of_bushing,
     resting,
@@ -109,17 +108,6 @@ def test_equilibrium_equals_root(engine, name, tmp_path):
     assert record.outcome.value == expected, record.message
     height = tip(resting(SUBJECTS[name]))[0]
     assert record.outputs["tip.z"].position == pytest.approx([height], abs=1e-13)
-
-
-@pytest.mark.by_day(12)
-@pytest.mark.parametrize("name", SUBJECTS)
-def test_free_motion_equals_integration(name, tmp_path):
-    times = np.linspace(0.0, 0.5, 6)
-    free = {"duration": 0.5, "samples": 6, "rates": {"pin": RATE}}
-    outputs = {"tip": OUTPUTS["tip"]}
-    found = kincheck.free(str(write(tmp_path, SUBJECTS[name], free=free, outputs=outputs)))
-    heights = [tip(q)[0] for q in falling(SUBJECTS[name], RATE, times)]
-    assert np.asarray(found.outputs["tip"]) == pytest.approx(heights, abs=1e-11)
 
 
 def lifted(tmp_path, subject):

@@ -15,11 +15,8 @@ from kincheck.core.extensions.designs.design_batch import solve_designs
 from kincheck.core.extensions.llvm import compiler
 from kincheck.core.extensions.llvm.executor import LlvmExecutor
 from kincheck.core.extensions.llvm.jit import LlvmCode
-from kincheck.core.kinematics import styles
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.continuation.sweep import sweep
-from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import (
     NODES,
     NumpyExecutor,
@@ -116,28 +113,6 @@ def test_sine_and_cosine_of_large_angles(traced, true):
         executor.run("f")
         # two units in the last place of one
         assert np.abs(executor.get([1])[0] - true(x)).max() <= 4e-16
-
-
-@pytest.mark.parametrize("style", styles())
-def test_machine_code_models_equal_numpy(style):
-    for mechanism, values in (
-        (mcpherson(), np.linspace(-0.08, 0.08, 33)),
-        (four_bar(), np.linspace(0.0, 2.0 * np.pi, 37)),
-    ):
-        driver = mechanism.drivers[0].name
-        path = Path({driver: Ramp(1.0)}, values)
-        found = []
-        for compiled in (False, True):
-            points = tuple(point.name for point in mechanism.points)
-            request = Request((driver,), points, style=style, compiled=compiled)
-            found.append(sweep(compile_model(mechanism, request), path, 1e-12))
-        for name in found[0].points:
-            a, b = (each.points[name] for each in found)
-            # ten units in the last place of one, each derivative losing the mechanisms' condition
-            # (about ten) once more
-            assert np.abs(a.position - b.position).max() <= 2e-15
-            assert np.abs(a.velocity - b.velocity).max() <= 2e-14
-            assert np.abs(a.acceleration - b.acceleration).max() <= 2e-13
 
 
 def test_numpy_executor_without_llvmlite(monkeypatch):

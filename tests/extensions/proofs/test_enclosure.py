@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from kincheck.core import (
     Body,
-    Gear,
     JointAngle,
     JointDisplacement,
     Mechanism,
@@ -139,29 +138,6 @@ def test_enclosure_of_every_joint_type(case):
             assert np.abs(native.position[k] - origin - moved).max() < 1e-14
             assert np.abs(native.velocity[k] - velocity).max() < 1e-13
             assert np.abs(native.acceleration[k] - acceleration).max() < 1e-11
-
-
-def test_enclosure_of_worm_gear_turns():
-    """A worm: twelve turns of the shaft are one of the wheel, and the samples are most of half a
-    turn apart.
-    """
-    axis, along = Z, (1.0, 0.0, 0.0)
-    gears = Mechanism(
-        "gears",
-        [Body("shaft"), Body("wheel")],
-        [
-            Revolute("first", "ground", "shaft", ORIGIN, axis),
-            Revolute("second", "ground", "wheel", (0.3, 0.0, 0.0), along),
-        ],
-        [Point("rim", "wheel", (0.3, 0.1, 0.0))],
-        [JointAngle("turn", "first")],
-        [Gear("worm", ("first", "second"), ratio=12.0)],
-    )
-    angles = np.linspace(-80.0, 80.0, 65)
-    found = proved(gears, "turn", angles)
-    for angle, each in zip(angles.tolist(), found.samples, strict=True):
-        assert isinstance(each, Enclosure), each
-        assert abs(float(each.points["rim"][0][1]) - 0.1 * (math.cos(angle / 12.0) - 1.0)) < 1e-13
 
 
 def test_enclosure_has_zero_redundant_rows():

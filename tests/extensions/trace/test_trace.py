@@ -2,7 +2,6 @@
 lies beyond them.
 """
 
-import math
 from dataclasses import replace
 from functools import cache
 
@@ -15,11 +14,7 @@ from kincheck.core.extensions.trace.curve import trace
 from ...kinematics.test_redundancy import locomotive
 from ...kinematics.test_singular import LIMITS
 from ...support.mechanisms import (
-    A0,
-    B0,
-    C0,
     CRANK,
-    D0,
     LEAN,
     ROD,
     chain,
@@ -29,7 +24,6 @@ from ...support.mechanisms import (
     mcpherson,
     planar_four_bar,
     pushed,
-    slider_crank,
 )
 
 # Limit points
@@ -75,43 +69,6 @@ def test_trace_beyond_limit_point():
     # the rods keep their lengths, there as before
     lengths = np.linalg.norm(curve.points["rod_end"] - np.array([1.14, 0.355, 0.1455]), axis=1)
     assert lengths == pytest.approx(lengths[0], abs=1e-14)
-
-
-def test_trace_of_rod_below_crank():
-    """Limits where the rod stands upright; between them the slider takes both places that the crank
-    leaves it.
-    """
-    rod = 0.1
-    curve = trace(slider_crank(rod), "turn", length=4.0, longest=0.1)
-    limit = np.arcsin(rod / CRANK)
-    assert [event.value for event in curve.events] == pytest.approx([limit, -limit], abs=1e-12)
-    assert curve.closed
-    low, high = (f"{each:.6g}" for each in (curve.values.min(), curve.values.max()))
-    assert curve.summary().startswith(f"turn from {low} to {high} rad, ")
-    offset = curve.points["end"][:, 0] - CRANK * np.cos(curve.values)
-    # 1e-16 under the root
-    assert np.abs(offset) == pytest.approx(
-        np.sqrt(rod**2 - (CRANK * np.sin(curve.values)) ** 2), abs=1e-9
-    )
-    first, second = (event.arc for event in curve.events)
-    assert ((offset < 0.0) == ((curve.arc > first) & (curve.arc < second))).all()
-
-
-def test_trace_of_rocker_driving_crank():
-    """Limits where crank and coupler are in line; the crank goes round, and the curve is closed."""
-    rocked = replace(four_bar(), drivers=[replace(four_bar().drivers[0], name="rock", joint="D")])
-    curve = trace(rocked, "rock", length=12.0, longest=0.1)
-    crank, coupler, rocker, base = map(math.dist, (A0, B0, C0, A0), (B0, C0, D0, D0))
-
-    def angle(reach):
-        return np.arccos((base**2 + rocker**2 - reach**2) / (2.0 * base * rocker))
-
-    design = angle(math.dist(A0, C0))
-    assert [event.value for event in curve.events] == pytest.approx(
-        [angle(reach) - design for reach in (coupler + crank, coupler - crank)]
-    )
-    assert curve.closed
-    assert curve.values[-1] == pytest.approx(0.0, abs=0.1)
 
 
 def test_trace_limit_with_branch():
