@@ -263,16 +263,15 @@ def _require_one_side_and_upright(
             f"found {written(role, 1)}, on the other side than {named[WHEEL_CENTER]} with"
             f" {written(WHEEL_CENTER, 1)}, expected all points on one side. Correct its sign",
         )
-    arms = [(f"{role.removesuffix('_rear')}_front", role) for role in at if role.endswith("_rear")]
-    for front, rear in (*arms, *template.ahead):
-        if front in at and at[front][0] <= at[rear][0]:
+    for front, rear in template.ahead:
+        if {front, rear} <= at.keys() and at[front][0] <= at[rear][0]:
             raise fault(
                 table.file,
                 named[front],
                 f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it"
                 f" in front of that. {advice}",
             )
-    for high, low in (*template.above, (WHEEL_CENTER, WHEEL_CONTACT)):
+    for high, low in template.above:
         if low in at and at[high][2] <= at[low][2]:
             raise fault(
                 table.file,
