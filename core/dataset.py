@@ -27,8 +27,6 @@ class Variable:
 
 AXIS = Variable("axis", ["x", "y", "z"])
 """Labels of the components of a vector."""
-PARAMETER = Variable("parameter", ["e0", "e1", "e2", "e3"])
-"""Labels of Euler parameters."""
 
 
 @dataclass(frozen=True, eq=False)

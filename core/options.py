@@ -201,6 +201,29 @@ def flags_of(each: Field[Any], meaning: Option) -> list[str]:
     return [flag or f"--{each.name.replace('_', '-')}" for flag in meaning.flags]
 
 
+def names_of_given(options: object, names: Iterable[str]) -> str:
+    """Return the names of the given options, for a message.
+
+    Options with the default None, False or [] count.
+    """
+    found = (
+        name
+        for name in names
+        if getattr(options, name) not in ([], (), None) and getattr(options, name) is not False
+    )
+    return ", ".join(f"--{name.replace('_', '-')}" for name in found)
+
+
+def asked(added: Iterable[type[T]], options: object) -> list[type[T]]:
+    """Return the classes of which the options have one that is given."""
+    return [
+        each
+        for each in added
+        if isinstance(options, each)
+        and names_of_given(options, (one.name for one, *_ in option_fields(each)))
+    ]
+
+
 def read_values(found: T) -> T:
     """Return options from Python as their readers read them.
 

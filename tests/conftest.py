@@ -205,7 +205,7 @@ def kincheck_main():
             patch.delenv("KINCHECK_HISTORY", raising=False)
             patch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
             patch.setattr(kincheck.adapters, "SIMULATIONS", {})
-            patch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, NATIVE))
+            patch.setattr(kincheck.adapters, "engine", lambda name, _: by_name.get(name, NATIVE))
             patch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
             patch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
             about = {name: (truth_of(case), case.source) for name, case in cases.items()}

@@ -7,7 +7,8 @@ left, and runs those that walk over commands, documents and sources.
 
 With --alone a copy has an extension and its needs alone, and runs its tests; NAME kernel has no
 extension, and runs the tests of the kernel. Together they take as long as the suite, and tests that
-ask for no more than their extension needs are right without any other.
+ask for no more than their extension needs are right without any other. Where each of its tests asks
+for a further one, none is run.
 """
 
 import argparse
@@ -19,9 +20,10 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+import pytest
 from kincheck.core.doors import extensions
 
-from .support.sources import EXTENSIONS, PACKAGE, ROOT
+from .support.sources import DELETED, EXTENSIONS, PACKAGE, ROOT
 
 COPIED = "core", "adapters", "cases", "tests", "docs", ".github", ".ci"
 FILES = "*.toml", "*.py", "*.md", "*.in", "*.lock", "*.cff", "Makefile", "Containerfile"
@@ -93,20 +95,20 @@ def needed(name: str) -> set[str]:
 
 def steps(name: str, folder: Path, options: argparse.Namespace) -> Iterator[Sequence[str]]:
     """Make the copy of a name, and yield the commands to run in it, each when it is ready."""
-    pytest = (sys.executable, "-m", "pytest")
+    run = (sys.executable, "-m", "pytest")
     if options.alone:
         copy_without(set(NAMES) - {name, *needed(name)}, folder)
         own = "tests" if name == KERNEL else f"tests/extensions/{name}"
         if (folder / own).exists():
-            yield *pytest, "--numprocesses", "auto", own
+            yield *run, "--numprocesses", "auto", own
         return
     copy_without([name], folder)
     yield sys.executable, "-c", WORKS, name, *NAMES
     if options.tests:
         for each in those_that_need(name):
             delete(each, folder)
-        yield *pytest, "--collect-only"
-        yield *pytest, "--numprocesses", "auto", *WALKS
+        yield *run, "--collect-only"
+        yield *run, "--numprocesses", "auto", *WALKS
 
 
 def main() -> int:
@@ -120,12 +122,12 @@ def main() -> int:
     for name in options.names or ([KERNEL, *NAMES] if options.alone else NAMES):
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
-            environment = {**os.environ, "PYTHONPATH": str(folder / "site")}
+            own = {"PYTHONPATH": str(folder / "site"), DELETED: " ".join(NAMES)}
             for command in steps(name, folder, options):
                 done = subprocess.run(
-                    command, cwd=folder, env=environment, capture_output=True, text=True
+                    command, cwd=folder, env=os.environ | own, capture_output=True, text=True
                 )
-                broken = bool(done.returncode)
+                broken = done.returncode not in (0, pytest.ExitCode.NO_TESTS_COLLECTED)
                 failed |= broken
                 lines = (done.stdout + done.stderr).splitlines() if broken else []
                 print(

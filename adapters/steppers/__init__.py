@@ -5,19 +5,16 @@ from ...core.doors import Extension
 EXTENSION = Extension(
     __name__,
     steppers={
-        name: f"scripts:{name.replace('-', '_')}"
-        for name in (
-            "mujoco",
-            "pinocchio",
-            "exudyn",
-            "drake",
-            "dart",
-            "simbody",
-            "pybullet",
-            "mjx",
-            "mujoco-warp",
-            "newton",
-            "genesis",
-        )
+        "mujoco": "scripts:mujoco",
+        "pinocchio": "scripts:pinocchio",
+        "exudyn": "scripts:exudyn",
+        "drake": "scripts:drake",
+        "dart": "scripts:dart",
+        "simbody": "scripts:simbody",
+        "pybullet": "scripts:pybullet",
+        "mjx": "scripts:mjx",
+        "mujoco-warp": "scripts:mujoco_warp",
+        "newton": "scripts:newton",
+        "genesis": "scripts:genesis",
     },
 )

@@ -158,9 +158,6 @@ class Range:
 
 
 MECHANISMS = Range(5e-3, 100.0)
-SUSPENSIONS = Range(0.03, 10.0, "a suspension of ")
-"""From model cars to haulage trucks. A wrong unit is an error by a factor of 1000, or at least 40.
-"""
 # Strokes relative to the mechanism's size, from some hundredths to some times as long.
 STROKES = Range(5e-4, 20.0)
 # From degrees converted to radians twice, or once, up to a few turns.

@@ -76,9 +76,6 @@ LENGTHS: Mapping[str, Unit] = {
 FORCES: Mapping[str, Unit] = {
     name: Unit(name, size, size.__mul__) for name, size in (("N", 1.0), ("kN", 1e3))
 }
-TORQUES: Mapping[str, Unit] = {
-    f"{name}m": Unit(f"{name}m", unit.size, unit.convert) for name, unit in FORCES.items()
-}
 ANGLES: Mapping[str, Unit] = {"rad": RADIAN, "deg": Unit("deg", math.pi / 180.0, math.radians)}
 
 

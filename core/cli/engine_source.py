@@ -28,7 +28,7 @@ class WorkersError(KincheckError):
 @options
 class EngineSource(Command):
     """Options that an extension adds to a command, with their meaning. The functions get all
-    options of the command.
+    options of the command, and are called if one of their own is given.
 
     Attributes:
         FOR: the command, "run" or "check-engine"; or "workers": all commands with worker processes.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..doors import offers
-from ..options import option_fields, options
+from ..options import asked, option_fields, options
 
 if TYPE_CHECKING:
     from ..case.io.atomic_files import Content
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 @options
 class Form:
-    """Options of an extension for further files. The functions get all options of the command."""
+    """Options of an extension for further files. The functions get all options of the command, and
+    are called if one of their own is given.
+    """
 
     @staticmethod
     def files_of(options: Any) -> dict[str, Path]:
@@ -57,11 +59,11 @@ def with_forms() -> Any:
 
 def files_of_forms(options: Any) -> dict[str, Path]:
     """Return the files requested by these options."""
-    asked = [form for form in forms() if isinstance(options, form)]
-    return {name: file for form in asked for name, file in form.files_of(options).items()}
+    found = asked(forms(), options)
+    return {name: file for form in found for name, file in form.files_of(options).items()}
 
 
 def contents_of_forms(options: Any, shown: Shown, verdict: str = "") -> list[tuple[Path, Content]]:
     """Return the contents of these files; see `Form.contents`."""
-    asked = [form for form in forms() if isinstance(options, form)]
-    return [each for form in asked for each in form.contents(options, shown, verdict)]
+    found = asked(forms(), options)
+    return [each for form in found for each in form.contents(options, shown, verdict)]

@@ -159,7 +159,7 @@ def registry() -> Registry:
         if name in others:
             point = class_loading.entry_points(class_loading.GROUP)[name]
             return class_loading.create_engine(name, point.load())
-        return adapters.engine(name) if mode == "projection" else adapters.engine(name, mode)
+        return adapters.engine(name, mode)
 
     return Registry(
         (*adapters.ENGINES, *others),

@@ -237,7 +237,7 @@ class Registry:
         from ..harness.engine import Unloadable
 
         try:
-            return self.engine(name) if mode == "projection" else self.engine(name, mode)
+            return self.engine(name, mode)
         except Exception as error:
             return Unloadable(name, f"{type(error).__name__}: {error}", mode)
 
@@ -245,16 +245,3 @@ class Registry:
 def tell_left_out(cases: Iterable[Case]) -> None:
     """Print on standard error the parts of other tools' files that were left out."""
     complain(f"{case.name}: {case.source}" for case in cases if LEFT_OUT in case.source)
-
-
-def names_of_given(options: object, names: Iterable[str]) -> str:
-    """Return the names of the given options, for a message.
-
-    Options with the default None, False or [] count.
-    """
-    found = (
-        name
-        for name in names
-        if getattr(options, name) not in ([], (), None) and getattr(options, name) is not False
-    )
-    return ", ".join(f"--{name.replace('_', '-')}" for name in found)

@@ -29,6 +29,7 @@ from ..harness.interrupts import hold, status_of, words_of
 from ..options import (
     CASES,
     argument,
+    asked,
     destination,
     group,
     joint_types,
@@ -201,8 +202,8 @@ class Run(Isolated, _Added, _Formed):  # pyright: ignore[reportUntypedBaseClass]
 
         self = _with_cases(self, registry)
         plan = _plan_run(self, registry)
-        data: list[Any] = [each.efforts(self) for each in sources(RUN)]
-        precision = next((each for each in data if each is not None), None)
+        data: list[Any] = [each.efforts(self) for each in asked(sources(RUN), self)]
+        precision = next((each for each in data if each), None)
         with delivery.json_only() if self.json == "-" else nullcontext():
             results, problems, keeping, stopped = _solve(self, plan)
         if self.out or self.json or keeping:
@@ -267,7 +268,7 @@ def _plan_run(options: Run, registry: Registry) -> _Plan:
         tell_left_out(cases)
     unused: list[str] = []
     added: list[Engine] = []
-    for source in sources(RUN):
+    for source in asked(sources(RUN), options):
         problems += source.contradictions(options)
         cases, found = source.engines(options, cases, problems)
         added += found
@@ -406,15 +407,18 @@ def _with_cases(options: Run, registry: Registry) -> Run:
 
 def _cases(options: Run, registry: Registry, unread: dict[str, str]) -> list[Case]:
     """Return the cases to solve; unreadable ones go to `unread`, or in Python raise."""
-    from ..case.joint_probe import probes
-
     if options.joints and options.reactions:
         raise KincheckError(
             "--reactions: the loops of --joints have no masses and no forces, so all reactions are"
             " zero. Leave out one of both."
         )
-    named = several(options.cases) or ([] if options.joints else registry.cases())
-    found = [*probes()] if options.joints else []
+    named, found = several(options.cases), []
+    if options.joints:
+        from ..case.joint_probe import probes
+
+        found = probes()
+    elif not named:
+        named = registry.cases()
     supplied = replace(options.supplied, recorded=given(options, "MOTIONS"))
     if options.command:
         cases = registry.find_cases([*map(str, named)], unread, found, supplied)

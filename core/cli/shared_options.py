@@ -15,6 +15,7 @@ from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits
 from ..options import (
     ONE_CASE,
     argument,
+    asked,
     group,
     joint_types,
     option,
@@ -105,7 +106,8 @@ class Isolated(_Workers):  # pyright: ignore[reportUntypedBaseClass]
 
 def contradictions(options: Isolated) -> list[str]:
     """Return the contradictions between the options."""
-    problems = [line for each in sources(WORKERS) for line in each.contradictions(options)]
+    found = asked(sources(WORKERS), options)
+    problems = [line for each in found for line in each.contradictions(options)]
     if options.jobs == 0 and (options.timeout or options.memory):
         problems.append(
             "--jobs 0 solves in this process, which cannot be limited. Leave out --timeout and"
@@ -114,11 +116,11 @@ def contradictions(options: Isolated) -> list[str]:
     return problems
 
 
-def unreachable(options: Any) -> list[str]:
+def unreachable(options: Isolated) -> list[str]:
     """Return why requested workers cannot be reached. This takes time, so it is the last check
     before the work.
     """
-    return [line for each in sources(WORKERS) for line in each.unreachable(options)]
+    return [line for each in asked(sources(WORKERS), options) for line in each.unreachable(options)]
 
 
 def solver(options: Isolated, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
@@ -127,7 +129,7 @@ def solver(options: Isolated, engines: Sequence[Engine]) -> tuple[Solver, dict[s
 
     limits = Limits(options.timeout or TIMEOUT, options.memory or MEMORY)
     limited = {"timeout": limits.timeout, "memory_gb": limits.memory}
-    for source in sources(WORKERS):
+    for source in asked(sources(WORKERS), options):
         if elsewhere := source.solver(options, limits):
             return elsewhere[0], elsewhere[1] | limited
     wanted = limits if options.timeout or options.memory else None

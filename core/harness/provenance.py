@@ -27,7 +27,9 @@ from .table_units import table_facts
 Suspicion: TypeAlias = Callable[
     [Case, Sequence[Record], Mapping[str, Series] | None], Suspect | None
 ]
-"""Suspicion of a case, by its records and, as far as they are known, native's outputs."""
+"""Suspicion of a case with a failed record, by all records and, as far as they are known, native's
+outputs.
+"""
 
 
 def results(
@@ -55,12 +57,13 @@ def results(
         records,
         [case.name for case in cases if not (case.origin and case.origin.own)],
     )
-    suspicions: list[Suspicion] = [each.load() for each in offers("suspicions").values()]
+    off = {record.case for record in records if record.outcome.bad}
+    suspicions: list[Suspicion] = [each.load() for each in offers("suspicions").values() if off]
     suspects = {
         case.name: found
         for suspect in suspicions
         for case in cases
-        if (found := suspect(case, records, (native or {}).get(case.name)))
+        if case.name in off and (found := suspect(case, records, (native or {}).get(case.name)))
     }
     return Results(
         run=known | {"engines": versions(records), **missing_pairs(plan, records)},

@@ -206,8 +206,3 @@ def deliver(
     if json == "-":
         to_standard_output(encoded)
     return problems
-
-
-def join_names(names: Sequence[str]) -> str:
-    """Return the names as one text."""
-    return ", ".join(names) or "none"

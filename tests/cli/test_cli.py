@@ -95,7 +95,7 @@ def test_simulators_run_in_worker_processes(
 def test_unloadable_adapter_gives_error_record(capsys, monkeypatch):
     native = kincheck.adapters.engine("native")
 
-    def load(name):
+    def load(name, mode):
         if name == "other":
             raise ImportError("libother.so: no such file")
         return native

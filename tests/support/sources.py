@@ -90,6 +90,8 @@ EXTENSIONS = frozenset(
     path.parent for path in SOURCES if "\nEXTENSION = " in (ROOT / path).read_text(encoding="utf-8")
 )
 """Folders of extensions."""
+DELETED = "KINCHECK_DELETED"
+"""Environment variable: extensions that tests may name though they have no folder."""
 
 
 def extension_of(path: Path) -> str | None:

@@ -26,7 +26,7 @@ from .outputs import output_lines, read_output, with_all_coordinates
 from .readers import LARGEST_FILE
 from .reference import read_reference, reason_against, reference_lines
 from .schema import SCHEMA, ClosureKeys, ReferenceKeys, UnitsKeys
-from .sections import case_keys, sections, undriven
+from .sections import CaseSection, case_keys, sections, undriven
 from .toml_text import toml_table
 
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
@@ -59,9 +59,10 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     written = Section(file, "units", keys.units).typed(UnitsKeys)
     units = FileUnits(LENGTHS[written.length], ANGLES[written.angle])
     root = replace(root, units=units)
-    for each in sections():
-        if (table := root.at(each.key)).value is not None:
-            table.typed(each.keys)
+    every = [(each, root.at(each.key)) for each in sections()]
+    added = [(each, table) for each, table in every if table.value is not None]
+    for each, table in added:
+        table.typed(each.keys)
     mechanism = read_mechanism(root, keys)
     columns = None
     if keys.reference is not None:
@@ -73,7 +74,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
         angle_unit=units.angle.name,
         formerly=tuple(keys.formerly),
     )
-    case = _with_outputs(root, case)
+    case = _with_outputs(root, case, added)
     with explained(file, "closure", units.length):
         closing = Section(file, "closure", keys.closure).typed(ClosureKeys)
         case = _within_digits(case, closing, closure)
@@ -86,8 +87,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
             f"found {found} beside a [reference], expected where that comes from; give one of"
             f" {kinds}"
         )
-    conventions = (each.convention(root.at(each.key)) for each in sections())
-    convention = next(filter(None, conventions), "")
+    convention = next(filter(None, (each.convention(table) for each, table in added)), "")
     case = replace(case, truth=keys.truth)
     return read_reference(file, columns, driver, units, case, convention, own_grid=own_grid)
 
@@ -118,23 +118,26 @@ def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case
     )
 
 
-def _with_outputs(root: Section, case: Case) -> Case:
-    """Return the case with its outputs and the additional points they need."""
+def _with_outputs(root: Section, case: Case, added: Sequence[tuple[CaseSection, Section]]) -> Case:
+    """Return the case with its outputs and the additional points they need.
+
+    Args:
+        added: the tables of extensions in the file.
+    """
     if not (root.at("points").value or root.at("outputs").value):
         raise root.at("points").fault(
             "found no point, expected one whose motion is compared; add [points.NAME], or an output"
             " of a joint or body, [outputs.NAME]"
         )
     tables: dict[str, Any] = {}
-    for each in sections():
-        if root.at(each.key).value is not None:
-            case, tables[each.key] = each.read(root.at(each.key), case)
+    for each, table in added:
+        case, tables[each.key] = each.read(table, case)
     named = root.at("outputs").each()
     outputs = tuple(read_output(name, section, tables, case) for name, section in named)
     outputs = outputs or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(case.mechanism, outputs), outputs=outputs)
-    for each in sections():
-        case = each.with_derived(case, tables.get(each.key))
+    for each, _ in added:
+        case = each.with_derived(case, tables[each.key])
     return case
 
 

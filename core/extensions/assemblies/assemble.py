@@ -21,7 +21,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dataset import AXIS, PARAMETER, Dataset, Variable
+from ...dataset import AXIS, Dataset, Variable
 from ...errors import SolveError, number_of
 from ...input_checks import real, require_kind, require_known, require_positive
 from ...kinematics.compiled.dense_equations import System
@@ -34,6 +34,8 @@ from ...primitives.base import Pose
 from ...tabular import Tabular
 from ...trajectory import Array, BodyMotion
 
+PARAMETER = Variable("parameter", ["e0", "e1", "e2", "e3"])
+"""Labels of Euler parameters."""
 MAX_ITERATIONS = 100
 # mu over |phi|^2: 0.01 to 1 serve alike on the strut; less lets singular Jacobians throw bodies
 # far, more takes twice the steps.

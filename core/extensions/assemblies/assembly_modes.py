@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Quat, Vec3, cross, quat, vec
-from ...dataset import AXIS, PARAMETER, Dataset, Variable
+from ...dataset import AXIS, Dataset, Variable
 from ...errors import number_of
 from ...input_checks import require_positive
 from ...joints import Joint
@@ -34,7 +34,7 @@ from ...mechanism.tree import spanning_tree
 from ...primitives.base import GROUND_POSE, Pose
 from ...tabular import Tabular
 from ...trajectory import Array
-from .assemble import Closing, require_named, require_shapes
+from .assemble import PARAMETER, Closing, require_named, require_shapes
 
 # A normalised triple product below this at design (half a degree) has no sign that rounding of a
 # table would not change.

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...cli.registry import Registry, Status, names_of_given
+from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase, driver_value
 from ...errors import KincheckError, refuse
 from ...options import (
     destination,
     json_file,
+    names_of_given,
     number_with_unit,
     option,
     options,

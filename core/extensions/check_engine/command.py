@@ -10,7 +10,7 @@ from ...cli.engine_source import CHECK_ENGINE, names_of, options_for, sources
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import TOL
 from ...errors import KincheckError, refuse
-from ...options import argument, options, verbosity
+from ...options import argument, asked, options, verbosity
 
 if TYPE_CHECKING:
     from ...harness.engine import Engine
@@ -61,7 +61,8 @@ class CheckEngine(_Added):  # pyright: ignore[reportUntypedBaseClass]
             raise KincheckError(NAME_ONE)
         problems = list[str]()
         named: list[Any] = [] if self.engine is None else [self.engine]
-        named += chain.from_iterable(source.engines(self, [], problems)[1] for source in added)
+        for source in asked(added, self):
+            named += source.engines(self, [], problems)[1]
         found = registry.find_engines(named, problems)
         refuse(problems)
         cases = {word: registry.case(name) for word, name in TOPOLOGIES.items()}

@@ -27,15 +27,13 @@ class Scheduler(EngineSource):
     @staticmethod
     def contradictions(options: Any) -> list[str]:
         """Return the contradictions between the options."""
-        if options.scheduler is None or options.jobs is None:
+        if options.jobs is None:
             return []
         return ["--scheduler: the cluster decides how many pairs run at a time. Leave out --jobs."]
 
     @staticmethod
     def unreachable(options: Any) -> list[str]:
         """Return why the scheduler cannot be reached."""
-        if options.scheduler is None:
-            return []
         from .distributed import ClusterError, connect_client, load_distributed
 
         try:
@@ -45,10 +43,8 @@ class Scheduler(EngineSource):
             return [str(error)]
 
     @staticmethod
-    def solver(options: Any, limits: Limits) -> tuple[Solver, dict[str, Any]] | None:
-        """Return the solver on the workers of the scheduler, if there is one."""
+    def solver(options: Any, limits: Limits) -> tuple[Solver, dict[str, Any]]:
+        """Return the solver on the workers of the scheduler."""
         from .distributed import on_cluster
 
-        if options.scheduler is None:
-            return None
         return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler}

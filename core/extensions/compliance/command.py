@@ -230,12 +230,17 @@ class MeasureCompliance(Isolated, _Formed):  # pyright: ignore[reportUntypedBase
 
 
 def _load(text: str) -> tuple[str, Any]:
-    from ...case.units import FORCES, TORQUES
+    from ...case.units import FORCES, Unit
 
     name, _, values = text.partition("=")
     if not values:
         raise KincheckError(f"--load {text}: expected NAME=A:B:N, as lateral=-3000:3000:31")
-    units = TORQUES if name == "aligning" else FORCES
+    units = FORCES
+    if name == "aligning":
+        units = {
+            f"{force}m": Unit(f"{force}m", unit.size, unit.convert)
+            for force, unit in FORCES.items()
+        }
     found = _values(f"--load {name}", values, units)
     return name, found if ":" in values else found[0]
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -37,6 +36,7 @@ from ...kinematics import solve
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Motion, Ramp
 from ...trajectory import Array, PointMotion
+from ..hardpoints.design import AxleMotion
 from ..hardpoints.suspension import PerTravel
 from ..statics.equilibrium import Equilibria, StaticModel
 from .rates import SIDES, Curve, wheel_rates
@@ -55,16 +55,6 @@ NO_VALUE = "it has no value at any of these samples, by its definition"
 OF_A_WHEEL = {"wheel_rate", "wheel_rate_opposite"}
 SMALL_LOAD, SMALL_TRAVEL = 1e-9, 1e-3
 """A wheel load of less is round-off [N], and travels are seldom shorter [m]."""
-
-
-class AxleMotion(StrEnum):
-    """Motion of both wheels of an axle over the travel: alike, against each other, or the heights
-    held while the swept driver steers.
-    """
-
-    HEAVE = "heave"
-    ROLL = "roll"
-    STEER = "steer"
 
 
 def compliance(

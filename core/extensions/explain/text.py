@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ...report.terminal import columns, join_names
+from ...report.terminal import columns
 from .bump_steer import REACH
 from .diagnose import Determinacy, Diagnosis, Sample
 from .rank import NamedRow, describe_screws
@@ -60,7 +60,7 @@ def _parts(found: Diagnosis, verbose: bool) -> Iterator[Text | Table]:
     if found.not_derived and found.samples:
         yield Text(
             "not functions of the pose alone, so without tolerance here:"
-            f" {join_names(found.not_derived)}"
+            f" {_names(found.not_derived)}"
         )
     if found.programs:
         yield _head("what the native engine computes")
@@ -75,13 +75,13 @@ def _freedom(found: Diagnosis, terms: int) -> Iterator[Text | Table]:
     freedom = found.freedom
     yield _head(
         f"freedom: {freedom.coordinates} coordinates - rank {freedom.rank} of {freedom.rows} joint"
-        f" rows = {freedom.dof}; drivers: {join_names(freedom.drivers)}"
+        f" rows = {freedom.dof}; drivers: {_names(freedom.drivers)}"
     )
     yield Text(f"by the paper's count {freedom.paper}")
     table = columns("component", ">unknowns", ">rows", ">rank", ">freedom", "drivers")
     for each in found.components:
         numbers = (f"{n}" for n in (each.unknowns, each.rows, each.rank, each.dof))
-        table.add_row(join_names(each.bodies), *numbers, join_names(each.drivers))
+        table.add_row(_names(each.bodies), *numbers, _names(each.drivers))
     yield table
     if not found.redundant:
         yield Text("redundant rows: none")
@@ -100,7 +100,7 @@ def _sum(terms: Sequence[tuple[float, NamedRow]], most: int) -> str:
     if len(terms) > most:
         return (
             f"a sum of {len(terms)} rows of"
-            f" {join_names(list(dict.fromkeys(row.owner for _, row in terms)))}"
+            f" {_names(list(dict.fromkeys(row.owner for _, row in terms)))}"
         )
     parts = [f"{'-' if w < 0.0 else '+'} {abs(w):.3g} [{row}]" for w, row in terms]
     return " ".join(parts).removeprefix("+ ") or "0"
@@ -161,7 +161,7 @@ def _forces(found: Determinacy) -> Iterator[Text | Table]:
         yield table
         yield Text("directions are global axes at the first sample; other components are null")
     if found.efforts:
-        yield Text(f"undetermined efforts: {join_names(found.efforts)}", "yellow")
+        yield Text(f"undetermined efforts: {_names(found.efforts)}", "yellow")
 
 
 def _directions(found: Sequence[Sequence[float]]) -> str:
@@ -264,11 +264,15 @@ def _sensitivities(found: Diagnosis, most: int) -> Iterator[Text | Table]:
     yield table
     together = [places for name, places in found.moves.items() if name in places[:-1]]
     if together:
-        yield Text(f"moved together: {join_names([' = '.join(each) for each in together])}")
+        yield Text(f"moved together: {_names([' = '.join(each) for each in together])}")
     if found.binding:
         places = dict.fromkeys(number.removesuffix(" " + number[-1]) for number in found.binding)
         yield Text(
             "changed alone, numbers of these bind (redundant rows contradict the others):"
-            f" {join_names(list(places))}",
+            f" {_names(list(places))}",
             "yellow",
         )
+
+
+def _names(found: Sequence[str]) -> str:
+    return ", ".join(found) or "none"

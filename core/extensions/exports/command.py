@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 from ...case.io.atomic_files import require_writable
 from ...case.io.atomic_files import written as written_file
 from ...case.io.escape import file_name
-from ...cli.registry import Registry, Status, names_of_given
+from ...cli.registry import Registry, Status
 from ...cli.shared_options import OfCase, driver_value
 from ...doors import Offer, offers
 from ...errors import MOST_NAMED, KincheckError, refuse, shortened, unknown
 from ...options import (
     destination,
+    names_of_given,
     number_with_unit,
     option,
     options,

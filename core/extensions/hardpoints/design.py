@@ -6,7 +6,7 @@ table as hardpoints.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -223,8 +223,15 @@ def mechanism_of(
     return mechanism, Sweep(strokes[0], travels.wheel, motions=ways)
 
 
-ON_THE_ROAD = ("scrub_radius", "mechanical_trail")
-AXLE = ("track", "roll_angle", "axle_roll_center_height", "axle_roll_center_offset")
+OF_WHEEL = (
+    *("caster", "kingpin_inclination", "roll_center_height", "jacking_coefficient"),
+    *("scrub_radius", "mechanical_trail", "wheelbase_change"),
+    *("anti_dive", "anti_lift", "anti_squat"),
+)
+OF_AXLE = ("track", "roll_angle", "axle_roll_center_height", "axle_roll_center_offset")
+WHILE_STEERING = ("ackermann", "ackermann_angles", "turning_circle")
+OF_STEERING = ("mean_steer_angle", "steering_ratio")
+"""Types of outputs in the order of tables."""
 RADII = (0.02, 3.0)
 WHEELBASES, HEIGHTS, TURNS = (0.1, 20.0), (0.005, 6.0), (1e-3, 1.0)
 """Radii of wheels, wheelbases, heights of the centre of gravity and rack travels per turn [m], from
@@ -376,14 +383,19 @@ def with_suspension_outputs(
     watched = list[str]()
 
     def add(name: str, kind: str, wheel: Vehicle, **own: Any) -> None:
-        outputs.append(types[kind](name, wheel, *default(extent, types[kind].measure), **own))
+        """Add an output if the vehicle's data define it."""
+        cls = types[kind]
+        if all(getattr(wheel, need) is not None for need in cls.needs):
+            output = cls(name, wheel, *default(extent, cls.measure), **own)
+            outputs.extend([output] * (not output.problem))
 
     vehicles = {"": replace(vehicle, travel=(STROKE,) * steered)}
     if motion is not None:
         vehicles = {f"{side}_": _on_side(vehicle, side) for side in Side}
     place = Place.WHEEL_CENTER if vehicle.wheel_radius is None else Place.CONTACT
+    arms = [each.type for each in SWING_ARMS] * swing_arms
     for prefix, wheel in vehicles.items():
-        for kind in _wheel_outputs(vehicle, swing_arms=swing_arms):
+        for kind in ("toe", "camber", *arms, *OF_WHEEL):
             add(prefix + kind, kind, wheel)
         add(f"{prefix}half_track_change", "half_track_change", wheel, at=place)
         for name, ends in template.springs.items():
@@ -403,7 +415,9 @@ def with_suspension_outputs(
                 # heave does not move an unlike pair of ends: one wheel travels, the other is held
                 alone = left if len({*ends}) == 1 else replace(left, travel=left.travel[:1])
                 add(name, "motion_ratio", alone, between=between)
-        for kind in _axle_outputs(vehicle, motion, steered=steered):
+        steering = motion == AxleMotion.STEER
+        turned = WHILE_STEERING * (steering or steered)
+        for kind in (*OF_AXLE, *turned, *OF_STEERING * steering):
             own = {"rack": RACK} if kind == "steering_ratio" else {}
             add(kind, kind, left, other=right, **own)
     outputs += with_all_coordinates(case, watched).outputs
@@ -430,43 +444,6 @@ def _on_side(vehicle: Vehicle, side: Side) -> Vehicle:
         kingpin=kingpin or None,
         travel=tuple(f"{each}_{STROKE}" for each in Side),
     )
-
-
-def _wheel_outputs(vehicle: Vehicle, *, swing_arms: bool) -> Iterator[str]:
-    """Yield the types of the outputs of a wheel that the data of its vehicle define."""
-    yield from ("toe", "camber")
-    for each in SWING_ARMS if swing_arms else ():
-        if vehicle.wheel_radius is not None or "wheel_radius" not in each.needs:
-            yield each.type
-    if vehicle.kingpin:
-        yield from ("caster", "kingpin_inclination")
-    if vehicle.wheel_radius is None:
-        return
-    yield from ("roll_center_height", "jacking_coefficient")
-    if vehicle.kingpin:
-        yield from ON_THE_ROAD
-    if vehicle.axle is None:
-        return
-    yield "wheelbase_change"
-    if vehicle.wheelbase is None or vehicle.cg_height is None:
-        return
-    if vehicle.brake_share is not None:
-        yield "anti_dive" if vehicle.axle is Axle.FRONT else "anti_lift"
-    if vehicle.drive_share is not None and vehicle.axle is Axle.REAR:
-        yield "anti_squat"
-
-
-def _axle_outputs(vehicle: Vehicle, motion: str, *, steered: bool) -> Iterator[str]:
-    """Yield the types of the outputs of an axle that the data of its vehicle define."""
-    steering = motion == AxleMotion.STEER
-    if vehicle.wheel_radius is not None:
-        yield from AXLE
-        if vehicle.wheelbase and (steering or steered):
-            yield from ("ackermann", "ackermann_angles", "turning_circle")
-    if steering:
-        yield "mean_steer_angle"
-        if vehicle.rack_per_turn:
-            yield "steering_ratio"
 
 
 def hardpoints_of(

@@ -239,16 +239,9 @@ class Guess:
         if said == self.fit.axes:
             return "a text of the file says so"
         roles = self.fit.roles
-        pairs = [(f"{r.removesuffix('_rear')}_front", r) for r in roles if r.endswith("_rear")]
-        pairs += self.fit.template.ahead
-        ahead = next((pair for pair in pairs if {*pair} <= roles.keys()), None)
-        above = next(
-            (
-                pair
-                for pair in ((WHEEL_CENTER, WHEEL_CONTACT), *self.fit.template.above)
-                if {*pair} <= roles.keys()
-            ),
-            None,
+        ahead, above = (
+            next((pair for pair in pairs if {*pair} <= roles.keys()), None)
+            for pairs in (self.fit.template.ahead, self.fit.template.above[::-1])
         )
         names = {role: visible(name) for role, name in roles.items()}
         told = [f"{names[WHEEL_CENTER]} is the outermost"]

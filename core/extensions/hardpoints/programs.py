@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...case.io.document import Section, fault, parse, shown
+from ...case.io.readers import text_of
 from ...errors import MOST_NAMED, brief, remedy, sentence, shortened
-from .options import WheelOptions
+from .options import HardpointOptions, WheelOptions
 from .table import Hardpoint, HardpointTable, number, require_name, twice, wanted_corner
 
 _TOKEN = re.compile(
@@ -165,7 +166,7 @@ _SUBSECTION = re.compile(r"\(\s*([A-Za-z_]+)\s*\)")
 _FIELD = re.compile(r"'([^']*)'|(\S+)")
 
 
-def read_adams(file: Path, text: str) -> HardpointTable:
+def read_adams(file: Path, supplied: HardpointOptions) -> HardpointTable:
     """Return the points of the left side and of the middle, by name.
 
     Raises:
@@ -176,6 +177,7 @@ def read_adams(file: Path, text: str) -> HardpointTable:
     section, sections, right = "", dict[str, int](), 0
     inner, variants = "", dict[str, list[str]]()
     columns = COLUMNS
+    text = text_of(file, of_spreadsheet=True)
     for k, line in enumerate(text.splitlines(), 1):
         row, where = line.strip(), f"line {k}"
         if not row or row.startswith(("$", "!")):
@@ -295,13 +297,13 @@ _BUSHING_KEYS = tuple(
 )
 
 
-def read_chrono(file: Path, text: str) -> HardpointTable:
+def read_chrono(file: Path, supplied: HardpointOptions) -> HardpointTable:
     """Return the points of a suspension, named "Section/Key" as in the file.
 
     Raises:
         CaseError: not JSON, no suspension, or an invalid point.
     """
-    tables = parse(file, without_comments(text))
+    tables = parse(file, without_comments(text_of(file)))
     kind = tables.get("Type", "Suspension")
     if kind != "Suspension":
         raise fault(
@@ -381,7 +383,7 @@ def is_assetto(text: str) -> bool:
     return re.search(rf"^\s*{_OF_ASSETTO.pattern}\s*=", text, re.MULTILINE) is not None
 
 
-def read_assetto(file: Path, text: str, supplied: WheelOptions) -> HardpointTable:
+def read_assetto(file: Path, supplied: WheelOptions) -> HardpointTable:
     """Return the points of an axle of Assetto Corsa (suspensions.ini), of its left wheel unless the
     corner is a right one.
 
@@ -393,7 +395,7 @@ def read_assetto(file: Path, text: str, supplied: WheelOptions) -> HardpointTabl
     """
     sections = dict[str, dict[str, tuple[str, str]]]()
     section, stray = "", list[str]()
-    for k, line in enumerate(text.splitlines(), 1):
+    for k, line in enumerate(text_of(file).splitlines(), 1):
         row = re.split(r";|//", line)[0].strip()
         key, equals, value = (part.strip() for part in row.partition("="))
         if head := _SECTION.fullmatch(row):

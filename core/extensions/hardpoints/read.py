@@ -19,7 +19,7 @@ from ...case.io.document import (
     unknown_name,
 )
 from ...case.io.readers import LEFT_OUT
-from ...case.notes import SUSPENSIONS
+from ...case.notes import Range
 from ...case.quantity import with_markers
 from ...case.units import plain
 from ...mechanism.mechanism import Mechanism, Vector
@@ -49,6 +49,9 @@ from .templates import (
     corner_in,
 )
 
+SUSPENSIONS = Range(0.03, 10.0, "a suspension of ")
+"""From model cars to haulage trucks. A wrong unit is an error by a factor of 1000, or at least 40.
+"""
 # Inner joints of a rack near the middle may be a little beyond it. No point of a wheel's suspension
 # is farther beyond the middle than this share of the half track.
 ACROSS = 0.25
@@ -260,16 +263,15 @@ def _require_one_side_and_upright(
             f"found {written(role, 1)}, on the other side than {named[WHEEL_CENTER]} with"
             f" {written(WHEEL_CENTER, 1)}, expected all points on one side. Correct its sign",
         )
-    arms = [(f"{role.removesuffix('_rear')}_front", role) for role in at if role.endswith("_rear")]
-    for front, rear in (*arms, *template.ahead):
-        if front in at and at[front][0] <= at[rear][0]:
+    for front, rear in template.ahead:
+        if {front, rear} <= at.keys() and at[front][0] <= at[rear][0]:
             raise fault(
                 table.file,
                 named[front],
                 f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it"
                 f" in front of that. {advice}",
             )
-    for high, low in (*template.above, (WHEEL_CENTER, WHEEL_CONTACT)):
+    for high, low in template.above:
         if low in at and at[high][2] <= at[low][2]:
             raise fault(
                 table.file,

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...case.io.readers import WORKBOOKS, Reader, ReaderOptions, text_of
+from ...case.io.readers import WORKBOOKS, Reader, ReaderOptions
+from ...doors import Offer
 from ...errors import CaseError, OpenError
+from . import EXTENSION
 from .options import NOTHING, HardpointOptions, WheelOptions
 
 if TYPE_CHECKING:
@@ -21,13 +23,17 @@ class HardpointReader(Reader):
     """A reader of hardpoints.
 
     Attributes:
-        table: returns the table of a file, by its options.
+        where: module and name of the function from a file and its options to its table.
         claim: see `Reader.claims`.
     """
 
     options: type[ReaderOptions] = WheelOptions
-    table: Callable[[Path, WheelOptions], HardpointTable] = field(kw_only=True)
+    where: str = field(kw_only=True)
     claim: Callable[[Path, str, WheelOptions], int] | None = None
+
+    def table(self, file: Path, options: WheelOptions) -> HardpointTable:
+        """Return the table of a file."""
+        return Offer(EXTENSION, self.where).load()(file, options)
 
     def claims(self, file: Path, text: str, options: WheelOptions) -> int:
         """Return how surely a file holds such points."""
@@ -81,12 +87,6 @@ def read_hardpoints(file: Path, supplied: WheelOptions = NOTHING) -> HardpointTa
     return reader.table(file, supplied)
 
 
-def _chrono(file: Path, supplied: WheelOptions) -> HardpointTable:
-    from .programs import read_chrono
-
-    return read_chrono(file, text_of(file))
-
-
 def _is_chrono(file: Path, text: str, supplied: WheelOptions) -> int:
     from .programs import is_chrono
 
@@ -104,20 +104,8 @@ def _tables(file: Path, text: str) -> Mapping[str, Any] | None:
     return None if "schema" in tables else tables
 
 
-def _adams(file: Path, supplied: WheelOptions) -> HardpointTable:
-    from .programs import read_adams
-
-    return read_adams(file, text_of(file, of_spreadsheet=True))
-
-
 def _is_adams(file: Path, text: str, supplied: WheelOptions) -> int:
     return 3 * ("[HARDPOINT]" in text)
-
-
-def _assetto(file: Path, supplied: WheelOptions) -> HardpointTable:
-    from .programs import read_assetto
-
-    return read_assetto(file, text_of(file), supplied)
 
 
 def _is_assetto(file: Path, text: str, supplied: WheelOptions) -> int:
@@ -136,32 +124,8 @@ def _is_assetto(file: Path, text: str, supplied: WheelOptions) -> int:
     return 1
 
 
-def _plain(file: Path, supplied: WheelOptions) -> HardpointTable:
-    from ...case.io.document import fault
-    from .rows import read_plain
-
-    text = text_of(file, of_spreadsheet=True)
-    if "[BAR]" in text:
-        raise fault(file, "", f"found a text with [BAR], which {TABLE.unread['.pm']}")
-    return read_plain(file, text, supplied)
-
-
 def _may_be_plain(file: Path, text: str, supplied: WheelOptions) -> int:
     return bool(supplied.template) or file.suffix.lower() == ".txt"
-
-
-def _workbook(file: Path, supplied: WheelOptions) -> HardpointTable:
-    from .rows import read_spreadsheet
-
-    return read_spreadsheet(file, supplied)
-
-
-def _tree(file: Path, supplied: WheelOptions) -> HardpointTable:
-    from .scripts import read_python
-    from .tree import read_tree
-
-    read = read_python if file.suffix.lower() == ".py" else read_tree
-    return read(file, text_of(file), supplied)
 
 
 def _may_be_tree(file: Path, text: str, supplied: WheelOptions) -> int:
@@ -190,18 +154,18 @@ CHRONO = HardpointReader(
     "Project Chrono suspension",
     HardpointOptions,
     others=(".json",),
-    table=_chrono,
+    where="programs:read_chrono",
     claim=_is_chrono,
 )
 ADAMS = HardpointReader(
     "Adams/Car hardpoints",
     HardpointOptions,
     (".sub", ".tpl", ".asy", ".hpt"),
-    table=_adams,
+    where="programs:read_adams",
     claim=_is_adams,
 )
 ASSETTO = HardpointReader(
-    "Assetto Corsa suspension", others=(".ini",), table=_assetto, claim=_is_assetto
+    "Assetto Corsa suspension", others=(".ini",), where="programs:read_assetto", claim=_is_assetto
 )
 TABLE = HardpointReader(
     "hardpoint table",
@@ -210,14 +174,16 @@ TABLE = HardpointReader(
         ".pm": "is a suspension of rFactor, whose bars have no names of points. Write their ends"
         " into a table, name,x,y,z, with --units m --axes left,up,rearward"
     },
-    table=_plain,
+    where="rows:read_plain",
     claim=_may_be_plain,
 )
 TREE = HardpointReader(
     "tree of hardpoints",
     suffixes=(".yaml", ".yml", ".py"),
     others=(".json", ".toml"),
-    table=_tree,
+    where="scripts:read_names",
     claim=_may_be_tree,
 )
-WORKBOOK = HardpointReader("workbook of hardpoints", suffixes=WORKBOOKS, table=_workbook)
+WORKBOOK = HardpointReader(
+    "workbook of hardpoints", suffixes=WORKBOOKS, where="rows:read_spreadsheet"
+)

@@ -19,6 +19,7 @@ from typing import TypeAlias
 from unicodedata import combining, normalize
 
 from ...case.io.document import fault, shown
+from ...case.io.readers import text_of
 from ...case.io.table import (
     DELIMITERS,
     Cell,
@@ -34,8 +35,9 @@ from ...case.io.table import (
 )
 from ...case.units import LENGTHS
 from ...errors import MOST_NAMED, OpenError, brief, shortened
-from .options import NOTHING, WheelOptions
+from .options import WheelOptions
 from .programs import plain_lines
+from .reader import TABLE
 from .table import (
     Hardpoint,
     HardpointTable,
@@ -99,7 +101,7 @@ _Parts: TypeAlias = tuple[Head, Sequence[Row], Sequence[Row]]
 """The head of a table, and the rows above and below it."""
 
 
-def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
+def read_plain(file: Path, supplied: WheelOptions) -> HardpointTable:
     """Return the points of a text by name.
 
     Args:
@@ -108,6 +110,9 @@ def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> Hardp
     Raises:
         CaseError: no head, or a row at odds with the head.
     """
+    text = text_of(file, of_spreadsheet=True)
+    if "[BAR]" in text:
+        raise fault(file, "", f"found a text with [BAR], which {TABLE.unread['.pm']}")
     table = text_table(file, text.splitlines(), COMMENTS, _delimiter)
     facts, remarks, comments = dict[str, str](), list[str](), {*table.comments}
     for k, comment in enumerate(text.splitlines(), 1):

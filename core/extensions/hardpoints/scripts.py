@@ -18,9 +18,10 @@ from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 from ...case.io.document import fault
+from ...case.io.readers import text_of
 from ...case.units import LENGTHS
 from ...errors import brief
-from .options import NOTHING, WheelOptions
+from .options import WheelOptions
 from .table import HardpointTable, length_name
 from .tree import (
     MOST_LINES,
@@ -29,6 +30,7 @@ from .tree import (
     fact_leaves,
     facts_of_comments,
     leaves_of,
+    read_tree,
     table_of,
     with_unit,
 )
@@ -55,7 +57,13 @@ class _Array(list[Any]):
     """An array of numbers: Python calculates with each of them, other than with a list."""
 
 
-def read_python(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
+def read_names(file: Path, supplied: WheelOptions) -> HardpointTable:
+    """Return the points of a tree of names, or of a script of Python."""
+    read = read_python if file.suffix.lower() == ".py" else read_tree
+    return read(file, text_of(file), supplied)
+
+
+def read_python(file: Path, text: str, supplied: WheelOptions) -> HardpointTable:
     """Return the points of the assignments of a Python script, dictionaries among them. Nothing is
     executed; other values than numbers, texts, lists and dictionaries are left out and listed.
 

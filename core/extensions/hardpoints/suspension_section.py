@@ -33,7 +33,6 @@ from .suspension import (
     Vehicle,
     camber_of_front_view,
 )
-from .suspension.base import WheelOutput
 from .suspension_keys import OtherWheelKeys, SuspensionKeys
 
 if TYPE_CHECKING:
@@ -371,9 +370,9 @@ class SuspensionSection(CaseSection):
         assert issubclass(cls, SuspensionOutput)
         return _of_wheel(name, section, cls, table, case)
 
-    def with_derived(self, case: Case, table: SuspensionTable | None) -> Case:
+    def with_derived(self, case: Case, table: SuspensionTable) -> Case:
         """Return the case with derivatives by travel, unless the table wants none."""
-        if table is None or not table.per_travel:
+        if not table.per_travel:
             return case
         return replace(case, outputs=with_slopes(case.outputs, size(case)))
 
@@ -387,8 +386,8 @@ class SuspensionSection(CaseSection):
 
     def further(self, case: Case, output: TypedQuantity) -> Iterator[tuple[str, Any]]:
         """Yield the side of a wheel, if the case has several."""
-        if isinstance(output, WheelOutput) and len(wheels_of(case)) > 1:
-            yield "side", output.vehicle.side
+        if "side" in output.further and len(wheels_of(case)) > 1:
+            yield "side", output.side
 
     def wheels(self, case: Case) -> Mapping[str, SceneWheel]:
         """Return the wheels of outputs; those without a radius cannot be drawn."""

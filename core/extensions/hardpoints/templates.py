@@ -243,6 +243,7 @@ def _read_templates() -> dict[str, Template]:
         wanted = roles(keys["roles"])
         optional = roles({**common["optional"], **keys.get("optional", {})})
         known = [role.name for role in (*wanted, *optional)]
+        fronts = [(f"{x.removesuffix('_rear')}_front", x) for x in known if x.endswith("_rear")]
         kingpin: Any = tuple(
             each if isinstance(each, str) else tuple(each) for each in keys.get("kingpin", ())
         )
@@ -253,8 +254,8 @@ def _read_templates() -> dict[str, Template]:
             twists={name: tuple(roles) for name, roles in keys["twists"].items()},
             across={name: tuple(ends) for name, ends in keys["across"].items()},
             bodies={**common["bodies"], **keys.get("bodies", {})},
-            above=keys.get("above", ()),
-            ahead=keys.get("ahead", ()),
+            above=(*keys.get("above", ()), (WHEEL_CENTER, WHEEL_CONTACT)),
+            ahead=(*fronts, *keys.get("ahead", ())),
             kingpin=kingpin or None,
             steered=keys.get("steered", ""),
             guessed=own.get("guessed", True),

@@ -24,7 +24,7 @@ from ...case.units import LENGTHS
 from ...errors import brief, remedy, sentence, shortened
 from ...mechanism.mechanism import Vector
 from ..yaml.reading import parse_yaml
-from .options import NOTHING, WheelOptions
+from .options import WheelOptions
 from .programs import without_comments
 from .table import (
     Hardpoint,
@@ -110,7 +110,7 @@ class Leaf:
         return ((*above, split[0]), split[1]) if split else None
 
 
-def read_tree(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
+def read_tree(file: Path, text: str, supplied: WheelOptions) -> HardpointTable:
     """Return the points of a YAML, JSON or TOML file.
 
     Args:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ...case.io.reader_options import Supplied
 from ...cli.parser import Command
-from ...cli.registry import Registry, Status, names_of_given
+from ...cli.registry import Registry, Status
 from ...cli.shared_options import MODE, MODES, TOL
 from ...errors import KincheckError, refuse, unknown
 from ...extras import how_to_install
@@ -22,6 +22,7 @@ from ...options import (
     destination,
     joint_types,
     json_file,
+    names_of_given,
     option,
     options,
     positive,

@@ -20,15 +20,13 @@ class BenchOfRun(EngineSource):
     @staticmethod
     def contradictions(options: Any) -> list[str]:
         """Return why the data have no place."""
-        if options.bench is None or options.out is not None:
+        if options.out is not None:
             return []
         return ["--bench adds to the report. Give --out DIR."]
 
     @staticmethod
     def efforts(options: Any) -> Any:
         """Return the efforts of a file of kincheck bench."""
-        if options.bench is None:
-            return None
         from .bench.engines import efforts_in
 
         return efforts_in(options.bench)

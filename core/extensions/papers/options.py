@@ -60,8 +60,6 @@ class Papers(Form):
         """Return the page with its PDF, and the figures."""
         page: Path | None = options.summary
         folder: Path | None = options.figures
-        if page is None and folder is None:
-            return []
         from ..reports.svg import svg
         from . import browser
         from .paper import paper_of

@@ -99,6 +99,7 @@ class CaseFile(pytest.File):
         from ...cli.run import Run
         from ...errors import KincheckError, refuse
         from ...harness.engine import Engine
+        from ...options import asked
 
         registry, problems = _registry(), list[str]()
         try:
@@ -110,7 +111,7 @@ class CaseFile(pytest.File):
             cases, recorded = [case], list[Engine]()
             if files := given["recorded"]:
                 options: Any = Run(recorded=[*map(Path, files)], curve=curve)
-                for source in sources(RUN):
+                for source in asked(sources(RUN), options):
                     cases, found = source.engines(options, cases, problems)
                     recorded += found
             refuse(problems)

@@ -110,8 +110,7 @@ class Program(EngineSource):
         """Return the program as an engine."""
         from .engine import ProgramEngine
 
-        command = options.engine_command
-        return [*cases], [] if command is None else [ProgramEngine(command)]
+        return [*cases], [ProgramEngine(options.engine_command)]
 
 
 def _foreign_engines(options: Any, cases: Sequence[Case]) -> list[Engine]:
@@ -120,8 +119,6 @@ def _foreign_engines(options: Any, cases: Sequence[Case]) -> list[Engine]:
     Raises:
         KincheckError: a command has another form, or an FMU cannot run.
     """
-    if not (options.engine_command or options.fmu):
-        return []
     from .engine import ProgramEngine
     from .fmu import read_fmu
 

@@ -48,10 +48,8 @@ class EquilibriumSection(CaseSection):
             except SolveError as error:
                 raise section.fault(str(error)) from None
 
-    def with_derived(self, case: Case, table: Resting | None) -> Case:
+    def with_derived(self, case: Case, table: Resting) -> Case:
         """Return the case with the efforts of its free drivers."""
-        if table is None:
-            return case
         from .resting import with_efforts
 
         return with_efforts(case, table.held)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...case.io.reader_options import Supplied
-from ...cli import shared_options
 from ...cli.parser import Command
 from ...cli.registry import Registry, Status
 from ...cli.shared_options import TOL
@@ -33,7 +32,7 @@ from ...options import (
 )
 from ...report.progress import complain, explain_no_comparison, missing_requirements
 from ...version import VERSION
-from ..cluster.source import SCHEDULER
+from ..cluster.source import SCHEDULER, Scheduler
 from .study_choices import Incomplete, Sampling
 
 if TYPE_CHECKING:
@@ -166,7 +165,8 @@ class Sweep(Command):
 
         whole = registry.case_of(self)
         case = only(whole, self.output, problems)
-        problems = problems or shared_options.unreachable(self)
+        if self.scheduler is not None:
+            problems = problems or Scheduler.unreachable(self)
         refuse(problems)
         variation = with_limits(self, read_variation(Path(self.variation), whole), whole, case)
         if self.replay and self.samples is None:

@@ -238,6 +238,8 @@ def moved_by(
     """
     if not names:
         raise CaseError("curves: places names nothing to vary, expected 'lca_front z' or the like")
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise CaseError(f"curves: places names {twice!r} twice; add its offsets in one column")
     geometry = Geometry(case)
     found = [_number(geometry, name) for name in names]
     moves = by_place([moved for moved, _ in found])

@@ -115,6 +115,7 @@ def test_assembly_rejects_violated_redundant_rows(monkeypatch):
     assert not found.converged.any()
 
 
+@pytest.mark.needs("laboratory")
 def test_assembly_by_exact_rows_is_spurious():
     _, home, spurious = found_from(mcpherson(), 0.8, 0.08, "conventional")
     assert home < 0.9
@@ -399,6 +400,7 @@ def test_assemblies_command_beyond_reach(capsys):
     assert "stroke = 0.29333" in out
 
 
+@pytest.mark.needs("writers")
 @pytest.mark.parametrize("to", READERS)
 def test_export_starts_in_chosen_assembly(to, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -325,6 +325,7 @@ def test_lock_up_leaves_state_alone(tmp_path):
 
 @compiled
 @pytest.mark.skipif(importlib.util.find_spec("fmpy") is None, reason="no FMPy")
+@pytest.mark.needs("recorded")
 @pytest.mark.parametrize("version", ["2", "3"])
 def test_fmu_passes_as_engine(version, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -454,6 +455,7 @@ def test_table_motion_equals_spline(tmp_path):
     assert call("move", state, 2.1, 1.0, out) == 1  # the table ends before
 
 
+@pytest.mark.needs("formulas")
 def test_formula_motion_is_refused(tmp_path):
     case = driven_by('type = "formula"\nformula = "STEP(TIME, 0, 0, 1, 2)"', tmp_path)
     with pytest.raises(KincheckError, match="the driver turn follows a formula"):

@@ -13,12 +13,13 @@ from itertools import combinations, permutations
 
 import numpy as np
 import pytest
+from kincheck.core.doors import extensions
 from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
 
 from ...support.cut_models import FORMATS, LAWS, random_closed, written
 
-if importlib.util.find_spec("pxr") is None:
+if "usd" not in extensions() or importlib.util.find_spec("pxr") is None:
     FORMATS = {form: way for form, way in FORMATS.items() if form != "USD"}
 SEEDS = range(int(os.environ.get("KINCHECK_ROBOTS", "8")))
 LOST = re.compile(r"lost in (\S+): (.+) of ([^()]+?)( \(\w+ cannot say it\))?")

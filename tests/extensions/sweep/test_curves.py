@@ -232,8 +232,8 @@ def test_design_out_of_reach_says_why(corner):
     assert found.solved[0].all()
     assert not found.solved[1].all()
     assert found.messages[1]
-    assert np.isnan(found.values["toe"][1][~found.solved[1]]).all()
-    assert np.isnan(found.slopes["toe"][1][~found.solved[1]]).all()
+    for each in (found.values, found.slopes):
+        assert np.isnan(each["toe"][1][~found.solved[1]]).all()
 
 
 WRONG = {
@@ -241,6 +241,7 @@ WRONG = {
     "no such row": ((["tierod_iner z"], [[0.0]]), "did you mean 'tierod_inner'"),
     "one name alone": (("tierod_inner z", [[0.0]]), "expected a list of names"),
     "nothing to vary": (([], [[]]), "names nothing to vary"),
+    "one place twice": ((["tierod_inner z"] * 2, [[0.0, 0.0]]), "'tierod_inner z' twice"),
     "one row": ((["tierod_inner z"], [0.0]), r"shape (1,), expected (designs, 1)"),
     "not finite": ((["tierod_inner z"], [[np.nan]]), "give finite numbers"),
     "no such output": ((["tierod_inner z"], [[0.0]], ["tow"]), "there is no output 'tow'"),

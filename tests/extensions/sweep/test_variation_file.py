@@ -134,7 +134,6 @@ def test_single_changes_begin_at_nominal(tmp_path):
 # Wrong files of variations, and the messages
 
 
-MATRIX = "matrix = [[1, 0.5], [0.5, 1]]"
 FAULTS = [
     *rows(
         """

@@ -17,14 +17,13 @@ import numpy as np
 from ....algebra import Vec3, root
 from ....case.quantity import HIDDEN
 from ....jet import Jet, arctan2, choose, known, sign, sqrt
-from .base import SuspensionOutput, held
+from .base import Rate, SuspensionOutput
 from .corner import PARALLEL, Corner, Side, Vehicle, angle_in_view
 
 # Wheels steered by less than this have no Ackermann of use [rad]: a quotient of two differences.
 STRAIGHT = 1e-2
 # A rack that turns the wheels by less than this steers nothing [rad/m]: usual ones do 5 to 12.
 NO_STEER = 1e-3
-_CARRIER = ("wheel_center", "spin_marker", "top_marker")
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,6 @@ class AxleOutput(SuspensionOutput):
     measure = "m"
     needs = ("wheel_radius",)
     further: ClassVar[Mapping[str, tuple[Any, Any]]] = {}
-    reads = ("wheel_center", "spin_marker", "wheel_contact")
 
     other: Vehicle = field(metadata=HIDDEN)
 
@@ -49,23 +47,9 @@ class AxleOutput(SuspensionOutput):
         return both if self.vehicle.side is Side.LEFT else both[::-1]
 
     @property
-    def points(self) -> tuple[str, ...]:
-        """Names of the points it reads, of both wheels."""
-        return tuple(name for wheel in self.vehicles for name in self.read_of(wheel))
-
-    @property
     def signs(self) -> str:
         """Convention of signs and axes, in words."""
         return self.vehicles[0].signs.replace("left wheel", "both wheels")
-
-    @abstractmethod
-    def both(self, left: Corner, right: Corner) -> Jet:
-        """Return the value of the formula over the samples."""
-
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the output over the samples."""
-        left, right = (Corner(wheel, at) for wheel in self.vehicles)
-        return self.both(left, right)
 
 
 @dataclass(frozen=True)
@@ -75,7 +59,7 @@ class Track(AxleOutput):
     type = "track"
     positive = "always"
 
-    def both(self, left: Corner, right: Corner) -> Jet:
+    def value(self, left: Corner, right: Corner) -> Jet:
         """Return the track [m]."""
         return left.contact.y + right.contact.y
 
@@ -88,7 +72,7 @@ class RollAngle(AxleOutput):
     measure = "rad"
     positive = "right side of the body down"
 
-    def both(self, left: Corner, right: Corner) -> Jet:
+    def value(self, left: Corner, right: Corner) -> Jet:
         """Return the roll angle [rad]."""
         a, b = left.contact, right.contact
         return arctan2(b.z - a.z, a.y + b.y)
@@ -101,10 +85,9 @@ class MeanSteerAngle(AxleOutput):
     type = "mean_steer_angle"
     measure = "rad"
     needs = ()
-    reads = ("wheel_center", "spin_marker")
     positive = "to the left (ISO 8855), to the right (SAE J670)"
 
-    def both(self, left: Corner, right: Corner) -> Jet:
+    def value(self, left: Corner, right: Corner) -> Jet:
         """Return the angle [rad]."""
         a, b = _to_the_left(left, right)
         return 0.5 * self.vehicle.convention.up * (a + b)
@@ -125,22 +108,16 @@ class SteeringRatio(AxleOutput):
     nowhere = "the wheels hardly steer there"
     measure = "1"
     needs = ("rack_per_turn",)
-    reads = ("wheel_center", "spin_marker")
     positive = "always"
 
     rack: str
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """Names of the points it reads."""
-        return (*super().points, self.rack)
 
     @property
     def orders(self) -> int:
         """Value and rate, which need velocities and accelerations."""
         return 2
 
-    def both(self, left: Corner, right: Corner) -> Jet:
+    def value(self, left: Corner, right: Corner) -> Jet:
         """Return the ratio [-]."""
         a, b = _to_the_left(left, right)
         turned = (0.5 * (a + b)).dot
@@ -171,7 +148,7 @@ class _WhileSteering(AxleOutput):
             ratio: track of the contact centres over the wheelbase [-].
         """
 
-    def both(self, left: Corner, right: Corner) -> Jet:
+    def value(self, left: Corner, right: Corner) -> Jet:
         """Return the output over the samples."""
         a, b = left.spin, right.spin
         first, second = -(a.y / a.x), b.y / b.x  # to the left
@@ -243,19 +220,13 @@ def _to_the_left(left: Corner, right: Corner) -> tuple[Jet, Jet]:
 
 
 @dataclass(frozen=True)
-class _AxleRollCenter(AxleOutput):
+class _AxleRollCenter(AxleOutput, Rate):
     """The kinematic roll centre: in the view from the front, the intersection of the lines from the
     contact centres to the instant centres, each wheel travelling by itself. It has no value where
     the lines are parallel.
     """
 
-    reads = _CARRIER
     nowhere = "the lines from the contact centres to the instant centres are parallel there"
-
-    @property
-    def orders(self) -> int:
-        """The value alone: steering is held for it, and its rate along the sweep is another."""
-        return 1
 
     @property
     def problem(self) -> str:
@@ -267,10 +238,8 @@ class _AxleRollCenter(AxleOutput):
             " by suspension.travel and suspension.other.travel"
         )
 
-    @property
-    def facts(self) -> Mapping[str, Any]:
-        """Properties for readers of results."""
-        return {**super().facts, **held(self.vehicle)}
+    def resting(self, at: Mapping[str, Vec3]) -> None:
+        """Return None: both wheels always travel."""
 
     def place(self, left: Corner, right: Corner) -> tuple[Jet, Jet]:
         """Return y to the left and z of the intersection, from the middle of the body [m].
@@ -299,7 +268,7 @@ class AxleRollCenterHeight(_AxleRollCenter):
     type = "axle_roll_center_height"
     positive = "above the road"
 
-    def both(self, left: Corner, right: Corner) -> Jet:
+    def value(self, left: Corner, right: Corner) -> Jet:
         """Return the height [m]."""
         a, b = left.contact, right.contact
         y, z = self.place(left, right)
@@ -314,7 +283,7 @@ class AxleRollCenterOffset(_AxleRollCenter):
     type = "axle_roll_center_offset"
     positive = "to the left (ISO 8855), to the right (SAE J670)"
 
-    def both(self, left: Corner, right: Corner) -> Jet:
+    def value(self, left: Corner, right: Corner) -> Jet:
         """Return the offset [m]."""
         y, _ = self.place(left, right)
         return self.vehicle.convention.up * y

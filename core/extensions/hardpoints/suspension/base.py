@@ -1,42 +1,58 @@
 """Base classes of suspension outputs: a formula over the vectors of a corner, with unit and sign;
 and derivatives by wheel travel.
 
-A new output type is a frozen dataclass with `type`, `measure`, `positive`, `needs`, `reads` and a
-formula, derived from one of the three kinds here, or from `AxleOutput`. The class declaration
+A new output type is a frozen dataclass with `type`, `measure`, `positive`, `needs` and a formula,
+derived from one of the three kinds here, or from `AxleOutput`. The class declaration
 registers it: case files can name it at once, and `kincheck list --outputs` prints it.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Annotated, Any, ClassVar
 
 from ....algebra import Scalar, Vec3, where_larger
 from ....case.case import HELD_BUT, PER_TRAVEL
 from ....case.io.schema import one_of
-from ....case.quantity import HIDDEN, Derived, TypedQuantity
-from ....jet import Jet
+from ....case.quantity import HIDDEN, Derived, PoseQuantity, TypedQuantity
+from ....jet import UNKNOWN, Jet
 from ....mechanism.mechanism import Mechanism, Point
 from .corner import Corner, Side, Vehicle
 
+KEPT = 4096
+"""Outputs whose points are kept: those of many axles, with slopes."""
 _SIDES: Any = Annotated[Side, one_of(Side)]
 
 
+class _ByFormula(PoseQuantity):
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points it reads."""
+        return _points_of(self)
+
+
+@lru_cache(KEPT)
+def _points_of(output: PoseQuantity) -> tuple[str, ...]:
+    """Return the names of the points that a formula reads: of none is anything known here."""
+    read = defaultdict[str, Vec3](lambda: Vec3(UNKNOWN, UNKNOWN, UNKNOWN))
+    output.of(read, read)
+    return tuple(read)
+
+
 @dataclass(frozen=True)
-class SuspensionOutput(TypedQuantity):
+class SuspensionOutput(_ByFormula, TypedQuantity):
     """A quantity of a wheel or an axle, judged, reported and compared like any other output.
 
     Attributes:
-        reads: vehicle attributes with the names of the points it reads.
         nowhere: reason why it has no value at some poses; empty if it has one at all.
         atol, rtol: an error is accepted up to atol [unit] + rtol * range of the reference.
     """
 
     further: ClassVar[Mapping[str, tuple[Any, Any]]] = {"side": (_SIDES | None, None)}
-    reads: ClassVar[tuple[str, ...]]
     nowhere: ClassVar[str] = ""
     registry: ClassVar[dict[str, type[SuspensionOutput]]] = {}
 
@@ -45,19 +61,6 @@ class SuspensionOutput(TypedQuantity):
     atol: float
     rtol: float
     why: str
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """Names of the points it reads."""
-        return self.read_of(self.vehicle)
-
-    def read_of(self, vehicle: Vehicle) -> tuple[str, ...]:
-        """Return the names of the points it reads of a wheel."""
-        read = list[str]()
-        for each in self.reads:
-            found: str | tuple[str, ...] | None = getattr(vehicle, each)
-            read += [found] if isinstance(found, str) else found or ()
-        return tuple(read)
 
     @property
     def vehicles(self) -> tuple[Vehicle, ...]:
@@ -96,34 +99,28 @@ class SuspensionOutput(TypedQuantity):
         """Convention of signs and axes, in words."""
         return self.vehicle.signs
 
-
-@dataclass(frozen=True)
-class WheelOutput(SuspensionOutput):
-    """A quantity of one wheel."""
-
-
-@dataclass(frozen=True)
-class _OfCorner(WheelOutput):
-    reads = ("wheel_center", "spin_marker")
-
     @abstractmethod
-    def value(self, corner: Corner) -> Jet:
-        """Return the value of the formula over the samples."""
+    def value(self, *corners: Any, **none: Any) -> Jet:
+        """Return the value of the formula, of the corner of each wheel."""
+
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """Return the output, minus its value at design if it is relative."""
+        now = self.value(*(Corner(wheel, at) for wheel in self.vehicles))
+        if not getattr(self, "relative", False):
+            return now
+        return now - self.value(*(Corner(wheel, design) for wheel in self.vehicles))
 
 
 @dataclass(frozen=True)
-class Change(_OfCorner):
+class Change(SuspensionOutput):
     """A coordinate relative to the design position."""
 
     measure = "m"
-
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the coordinate minus its value at design."""
-        return self.value(Corner(self.vehicle, at)) - self.value(Corner(self.vehicle, design))
+    relative: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
-class Attitude(_OfCorner):
+class Attitude(SuspensionOutput):
     """An angle or an offset, known at every position.
 
     Attributes:
@@ -134,14 +131,9 @@ class Attitude(_OfCorner):
 
     relative: bool = False
 
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the angle or offset, minus its value at design if relative."""
-        value = self.value(Corner(self.vehicle, at))
-        return value - self.value(Corner(self.vehicle, design)) if self.relative else value
-
 
 @dataclass(frozen=True)
-class Rate(_OfCorner):
+class Rate(SuspensionOutput):
     """A quotient of velocities, known only while the wheel travels, with one derivative less.
 
     It is a property of the position: other drivers are held, see `Vehicle.travel`.
@@ -161,11 +153,7 @@ class Rate(_OfCorner):
         """Properties for readers of results."""
         return {**super().facts, **held(self.vehicle)}
 
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the quotient; it has no value while the wheel is at rest."""
-        return self.value(Corner(self.vehicle, at))
-
-    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar]:
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar] | None:
         """Return the squares of the speeds of travel and of the fastest point."""
         return speeds(self.vehicle, at)
 
@@ -189,7 +177,7 @@ def _larger(a: Scalar, b: Scalar) -> Scalar:
 
 
 @dataclass(frozen=True)
-class PerTravel(Derived):
+class PerTravel(_ByFormula, Derived):
     """The derivative of an output by wheel travel (jounce): the upward displacement of the wheel
     centre relative to the vehicle's body.
 
@@ -207,11 +195,6 @@ class PerTravel(Derived):
     def name(self) -> str:
         """Name of the output with the suffix `PER_TRAVEL`."""
         return f"{self.of_output.name}{PER_TRAVEL}"
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """Names of the points it reads."""
-        return tuple(dict.fromkeys((*self.of_output.points, self.vehicle.wheel_center)))
 
     @property
     def orders(self) -> int:

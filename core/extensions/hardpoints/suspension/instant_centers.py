@@ -12,7 +12,6 @@ Suspension Design Factors (help.altair.com/hwdesktop), whose lengths have no sig
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -32,7 +31,6 @@ class _InView(Rate):
     """
 
     measure = "m"
-    reads = ("wheel_center", "spin_marker", "top_marker")
     nowhere = "the wheel hardly travels there, or its swing arm is almost endless"
     side_view: ClassVar[bool] = False
 
@@ -44,10 +42,6 @@ class _InView(Rate):
         along, turn = (v.x, -corner.pitch) if self.side_view else (v.y, corner.roll)
         speed: Scalar = root(along.x * along.x + v.z.x * v.z.x)
         return along, v.z, known(turn.x, PARALLEL * speed, turn)
-
-    @abstractmethod
-    def value(self, corner: Corner) -> Jet:
-        """Return the value of the formula over the samples."""
 
 
 @dataclass(frozen=True)

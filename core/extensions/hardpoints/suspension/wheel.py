@@ -23,7 +23,7 @@ import numpy as np
 from ....algebra import Vec3, cross
 from ....jet import Jet, arctan2, norm, sqrt
 from ....trajectory import Array
-from .base import Attitude, Change, Rate, WheelOutput
+from .base import Attitude, Change, Rate, SuspensionOutput
 from .corner import Axle, Convention, Corner, Reaction, angle_in_view, distance, velocity
 
 
@@ -111,14 +111,7 @@ def camber_of_front_view(seen: Array, toe: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Shift(Change):
-    reads = ("wheel_center", "spin_marker", "wheel_contact")
-
     at: Place = Place.CONTACT
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """Wheel centre; for the contact centre also the axis of rotation."""
-        return super().points if self.at is Place.CONTACT else (self.vehicle.wheel_center,)
 
     @property
     def problem(self) -> str:
@@ -178,7 +171,6 @@ class WheelDisplacement(Change):
 
     type = "wheel_displacement"
     positive = "x forward, y left, z up (ISO 8855); x forward, y right, z down (SAE J670)"
-    reads = ("wheel_center",)
 
     component: AxisName = AxisName.Z
 
@@ -210,7 +202,6 @@ class _Inclination(Attitude):
     """Angle between the steering axis and the vertical, in a view along an axis of the vehicle."""
 
     needs = ("kingpin",)
-    reads = ("wheel_center", "kingpin_points")
     nowhere = "the steering axis lies along the view there"
 
 
@@ -248,7 +239,6 @@ class _GroundOffset(Attitude):
 
     measure = "m"
     needs = ("wheel_radius", "kingpin")
-    reads = ("wheel_center", "spin_marker", "wheel_contact", "kingpin_points")
     nowhere = "the steering axis is parallel to the road there"
 
 
@@ -283,9 +273,6 @@ class MechanicalTrail(_GroundOffset):
         return corner.heading @ corner.kingpin_offset
 
 
-_CARRIER = ("wheel_center", "spin_marker", "top_marker")
-
-
 @dataclass(frozen=True)
 class RollCenterHeight(Rate):
     """Height of the kinematic roll centre above the road, for parallel travel of an axle's wheels.
@@ -298,7 +285,6 @@ class RollCenterHeight(Rate):
     type = "roll_center_height"
     measure = "m"
     needs = ("wheel_radius",)
-    reads = _CARRIER
     positive = "above the road"
 
     def value(self, corner: Corner) -> Jet:
@@ -317,15 +303,9 @@ class MotionRatio(Rate):
 
     type = "motion_ratio"
     measure = "1"
-    reads = ("wheel_center",)
     positive = "compressed in jounce"
 
     between: tuple[str, str]
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """Wheel centre and both ends."""
-        return (*super().points, *self.between)
 
     def value(self, corner: Corner) -> Jet:
         """Return the motion ratio [-]."""
@@ -345,7 +325,6 @@ class JackingCoefficient(Rate):
     type = "jacking_coefficient"
     measure = "1"
     needs = ("wheel_radius",)
-    reads = _CARRIER
     positive = "a force inboard on the tyre lifts the body"
 
     def value(self, corner: Corner) -> Jet:
@@ -355,7 +334,7 @@ class JackingCoefficient(Rate):
 
 
 @dataclass(frozen=True)
-class Twist(WheelOutput):
+class Twist(SuspensionOutput):
     """Turn of a part from design about an axis fixed to the body: of an arm with a torsion bar, a
     rocker, or half an anti-roll bar.
 
@@ -365,19 +344,16 @@ class Twist(WheelOutput):
 
     type = "twist"
     measure = "rad"
-    reads = ("wheel_center",)
     positive = "right-handed about the axis from its first to its second point, on the left side"
 
     about: tuple[str, str, str]
 
-    @property
-    def points(self) -> tuple[str, ...]:
-        """Wheel centre, the axis and the part."""
-        return (*super().points, *self.about)
-
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the angle [rad]: of the part's point at design and now, seen along the axis."""
-        now, then = Corner(self.vehicle, at), Corner(self.vehicle, design)
+        return self.value(Corner(self.vehicle, at), Corner(self.vehicle, design))
+
+    def value(self, now: Corner, then: Corner) -> Jet:
+        """Return the angle from one pose to another [rad]."""
         first, second, part = self.about
         axis = now.point(second) - now.point(first)
         r, r_design = (each.point(part) - each.point(first) for each in (now, then))
@@ -399,7 +375,6 @@ class _Anti(Rate):
     """
 
     measure = "1"
-    reads = _CARRIER
     needs = ("axle", "wheel_radius", "wheelbase", "cg_height", "brake_share")
     braking: ClassVar[bool] = True
     axle: ClassVar[Axle]
