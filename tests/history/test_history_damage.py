@@ -203,6 +203,12 @@ def test_history_passes_over_damaged_run(damaged, tmp_path, capsys):
     passed_over(capsys, damaged)
 
 
+def test_report_passes_over_damaged_run(damaged, tmp_path, capsys):
+    assert report(damaged, "--out", tmp_path / "out") == 2
+    assert "run 3 against run 1 (last green)" in passed_over(capsys, damaged)
+    assert (tmp_path / "out" / "report.html").exists()
+
+
 def test_report_skips_run_with_damaged_record(path, capsys):
     nights(path, 3)
     change(path, "UPDATE records SET record = x'00' WHERE run_id = 2")

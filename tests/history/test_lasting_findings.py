@@ -148,6 +148,21 @@ def test_slow_drift_is_reported(path):
     assert finding.now == pytest.approx(125.0 * finding.before)
 
 
+def test_step_stays_until_repaired(path):
+    nights(path, 3)
+    for _ in range(3):
+        keep_changed(path, **worse(100.0))
+    assert [told(reported(path, run)) for run in ("4", "5", "6")] == [
+        {(Kind.DRIFTED, *FIRST)},
+        {(Kind.DRIFTED, *FIRST)},
+        {(Kind.DRIFTED, *FIRST)},
+    ]
+    assert [(step.first, step.last) for step in reported(path).steps] == [(4, 3)]
+    assert [(each.since, each.against) for each in reported(path).regressions] == [(4, 3)]
+    nights(path, 1)
+    assert told(reported(path)) == set()
+
+
 def test_widened_tolerance_keeps_step(path):
     for factor, wide in ((1.0, 1.0), (1.0, 1.0), (100.0, 1.0), (100.0, 1e4)):
         keep(path, changed(changed(records(), **worse(factor)), **held_to(wide)))

@@ -39,6 +39,16 @@ def timed(record, factor):
 # False alarms
 
 
+def test_noise_is_no_regression(path):
+    noise = random.Random(943745)
+    for _ in range(20):
+        keep(path, records(noise=noise), calibration_seconds=0.02 * noise.uniform(0.8, 1.25))
+    for run in range(2, 21):
+        for against in ("last-green", "1"):
+            found = reported(path, str(run), against)
+            assert (found.findings, found.steps, found.regressed) == ([], [], False)
+
+
 def test_slow_machine_is_no_regression(path):
     nights(path, 8)
     keep(path, [timed(each, 4.0) for each in records()], calibration_seconds=0.08)
@@ -406,6 +416,14 @@ def test_changed_sweep_is_reported(path, driver, count):
     moved, messages, _ = found_after(path, driver=driver)
     assert moved == [(Kind.MOVED, *FIRST)] * count
     assert messages == ["solved at other values of the drivers than before"] * count
+
+
+def test_fewer_samples_are_reported_lost(path):
+    keep(path, records())
+    keep_changed(path, solved=2, samples=2)
+    (finding,) = reported(path, against="1").findings
+    assert finding.kind is Kind.LOST
+    assert finding.message == "2 of 2 samples solved, 9 of 9 before"
 
 
 def test_grown_error_is_reported_as_drift(path):

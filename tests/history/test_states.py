@@ -3,6 +3,7 @@ the right run, and quiet nights are never red.
 """
 
 import dataclasses
+import random
 
 import pytest
 from kincheck.core.case.io.case_file import case_text, load_case
@@ -26,6 +27,77 @@ from ..support.history_runs import (
     times,
     worse,
 )
+
+NIGHTS = 30
+
+
+def noisy(noise):
+    """Records of a night: times about 8 % and errors about 30 % off 2.5e-14 m."""
+    found = records(noise=noise)
+    for each in found:
+        for output in ("x", "y"):
+            factor = 0.05 * 2.0 ** noise.uniform(-0.5, 0.5)
+            about = {"case": each.case, "engine": each.engine}
+            found = changed(found, **about, **worse(factor, output))
+    return found
+
+
+def circumstances(noise, upgrade):
+    """Circumstances of a night: the loop's noise, and a version that may change."""
+    return {
+        "calibration_seconds": 0.02 * noise.uniform(0.9, 1.1),
+        "numpy": "2.1.0" if upgrade else "2.0.0",
+    }
+
+
+PLANTED = {
+    "drift": (worse(30000.0), Kind.DRIFTED),
+    "time": (times(2.6), Kind.SLOWER),
+    "failure": ({"outcome": Outcome.FAIL, "message": "x is off"}, Kind.FAILURE),
+    "lost": ({"solved": 7}, Kind.LOST),
+}
+
+
+def seeds(count):
+    """One seed by day, and the others at night."""
+    return [1, *(pytest.param(k, marks=pytest.mark.nightly) for k in range(2, count + 1))]
+
+
+@pytest.mark.parametrize("seed", seeds(40))
+def test_quiet_nights_are_never_red(path, seed):
+    noise = random.Random(seed)
+    upgrade = noise.randrange(5, NIGHTS)
+    for night in range(NIGHTS):
+        if noise.random() < 0.1:
+            continue  # a missing night
+        keep(path, noisy(noise), **circumstances(noise, night >= upgrade))
+        if night % 10 == 9 or night == NIGHTS - 1:
+            found = reported(path)
+            assert (found.regressions, found.steps) == ([], [])
+
+
+@pytest.mark.parametrize("what", PLANTED)
+@pytest.mark.parametrize("seed", seeds(8))
+def test_planted_step_stays_until_repaired(path, what, seed):
+    changes, kind = PLANTED[what]
+    noise = random.Random(seed)
+    begin = noise.randrange(7, 20)
+    lasting = 3 if what == "time" else noise.randrange(2, 9)
+    upgrade = noise.choice((begin, begin + 1, NIGHTS))
+    first = None
+    for night in range(begin + lasting + 2):
+        bad = begin <= night < begin + lasting
+        made = noisy(noise)
+        made = changed(made, **changes) if bad else made
+        run = keep(path, made, **circumstances(noise, night >= upgrade))
+        first = first or (run if bad else None)
+        if night < begin - 1:
+            continue
+        found = reported(path)
+        assert found.regressed is bad
+        if bad:
+            about = {(each.kind, each.case, each.engine, each.since) for each in found.regressions}
+            assert about == {(kind, *FIRST, first)}
 
 
 def test_accepted_step_is_told_once(path, capsys):
@@ -181,3 +253,16 @@ def test_killed_run_forgets_no_failure(path):
     keep(path, without_first(records()), status="interrupted")
     keep(path, without_first(records()))
     assert gone_since(path) == [(Kind.LOST, FIRST, 3)]
+
+
+def test_drift_is_hidden_by_no_selection(path):
+    """All of its results pass, and another selection is run after it."""
+    other = {"command": "kincheck run second"}
+    second = [each for each in records() if each.case == "second"]
+    for _ in range(2):
+        keep(path, records())
+        keep(path, second, **other)
+    run = keep_changed(path, **worse(30000.0))
+    keep(path, second, **other)
+    found = reported(path)
+    assert (found.run.number, found.regressed) == (run, True)

@@ -224,6 +224,41 @@ def test_concurrent_runs_are_stored(path):
     assert sorted(said) == [["1", "True"], ["2", "True"]]
 
 
+OPENERS = """
+import os, sys, time
+from pathlib import Path
+from kincheck.core.history.store import Store
+for k in range(20):
+    at, children = time.time() + 0.004, []
+    for c in range(4):
+        child = os.fork()
+        if not child:
+            time.sleep(max(0.0, at + 0.0007 * c - time.time()))
+            try:
+                with Store(Path(sys.argv[1]) / f"{k}.sqlite"):
+                    os._exit(0)
+            except BaseException as error:
+                print(error, flush=True)
+                os._exit(1)
+        children.append(child)
+    for child in children:
+        os.waitpid(child, 0)
+"""
+
+
+def test_new_history_opens_concurrently(tmp_path):
+    """A thousandth of a second apart, while one of them is making the tables."""
+    ran = subprocess.run(
+        [sys.executable, "-c", OPENERS, tmp_path],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert ran.stdout == ""
+    assert len(list(tmp_path.glob("*.sqlite"))) == 20
+
+
 def test_schema_check_is_one_statement(path):
     """Between two statements another process may make the tables, and half of them would show."""
     statements = []

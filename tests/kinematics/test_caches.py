@@ -68,11 +68,40 @@ def test_model_cache_of_designs(made):
     np.testing.assert_array_equal(first, again)
 
 
+def test_model_cache_is_shared_by_threads():
+    alone = solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy()
+    with ThreadPoolExecutor(4) as threads:
+        for found in threads.map(lambda _: solve(mcpherson(), "stroke", STROKES), range(24)):
+            np.testing.assert_array_equal(found.points["wheel"].acceleration, alone)
+
+
 @pytest.fixture
 def swept(monkeypatch):
     """Paths through components."""
     blocks = pytest.importorskip("kincheck.core.extensions.blocks.sweep")
     return calls(monkeypatch, blocks.BlockSweep, "__init__")
+
+
+def test_cache_keeps_last_path_of_chain(swept):
+    turn, half = np.linspace(-0.1, 0.2, 9), np.linspace(-0.1, 0.05, 9)
+    found = []
+    for values, number in ((turn, 1), (turn, 1), (half, 2), (turn, 3)):
+        found.append(solve(chain(21), "turn", values).points["end"].acceleration)
+        assert len(swept) == number
+    for each in (found[1], found[3]):
+        np.testing.assert_array_equal(each, found[0])
+
+
+def test_path_cache_is_per_thread(swept):
+    turn = np.linspace(-0.1, 0.2, 9)
+    with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
+        found = [
+            pool.submit(solve, chain(21), "turn", turn).result().points["end"].acceleration
+            for pool in (one, other, one, other)
+        ]
+    assert len(swept) == 2
+    for each in found[1:]:
+        np.testing.assert_array_equal(each, found[0])
 
 
 @pytest.mark.usefixtures("own_joint_types")

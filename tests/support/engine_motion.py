@@ -13,7 +13,7 @@ from kincheck import adapters
 from kincheck.core import Body, JointAngle, Mechanism, Point
 from kincheck.core import solve as solve_natively
 from kincheck.core.case.case import TIME, Case, Output, Sweep, Truth
-from kincheck.core.joints import Fixed, Revolute, Spherical, Translational, Universal
+from kincheck.core.joints import Distance, Fixed, Revolute, Spherical, Translational, Universal
 from kincheck.core.mechanism.tree import SpanningTree, spanning_tree
 
 from .joint_loops import TYPES
@@ -128,6 +128,19 @@ def assert_as_native(engine, mechanism, values, rate=1.0, cut=(), **more):
     return found
 
 
+def assert_consistent(motion, dt):
+    """Velocity and acceleration against eighth-order differences over uniform samples."""
+    weights, n = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280]), len(motion.position)
+    for x, rates in (
+        (motion.position, motion.velocity),
+        (motion.velocity, motion.acceleration),
+    ):
+        pairs = ((w, x[4 + k : n - 4 + k], x[4 - k : n - 4 - k]) for k, w in enumerate(weights, 1))
+        found = sum(w * (after - before) for w, after, before in pairs) / dt
+        # differences: round-off 1e-16 / dt of values about 1, times the mechanism's amplification
+        assert np.abs(found - rates[4:-4]).max() <= 1e-10 * (1.0 + np.abs(rates).max())
+
+
 def mechanism_of(joints, points, drivers, couplers=(), fixed=()):
     """Bodies are those of the joints; points: name -> (body, position)."""
     names = dict.fromkeys(body for joint in joints for body in joint.bodies if body != "ground")
@@ -169,8 +182,14 @@ def rocker(B, length):
     return np.stack([0.6 + 0 * f, 0.3 + 0.4 * np.cos(f), 0.1 + 0.4 * np.sin(f)], axis=1)
 
 
+CRANK_PIN = 0.1 * np.stack([np.cos(CRANK_TURN), np.sin(CRANK_TURN), 0 * CRANK_TURN], axis=1)
 B0 = np.array([[0.1, 0.0, 0.0]])
 C0 = tuple(rocker(B0, 0.76)[0])
+RSSR = (
+    Revolute("a", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    Revolute("c", "rocker", "ground", (0.6, 0.3, 0.1), X),
+    Distance("rod", "crank", "rocker", (tuple(B0[0]), C0)),
+)
 
 
 def slider_crank():

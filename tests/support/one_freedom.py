@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
@@ -352,6 +353,18 @@ def tip(q):
 def resting(subject):
     """Return the angle of rest next to the design [rad]."""
     return brentq(lambda q: hold(subject, q), -0.9, 0.9, xtol=1e-15, rtol=1e-15)
+
+
+def falling(subject, rate, times):
+    """Return the angle of the free crank from rest at design with a rate."""
+
+    def slope(_, state):
+        q, speed = state
+        whole, half = inertia(subject, q)
+        return [speed, -(half * speed**2 + hold(subject, q, speed)) / whole]
+
+    ends = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "t_eval": times, "max_step": 5e-3}
+    return solve_ivp(slope, (0.0, times[-1]), [0.0, rate], **ends).y[0]
 
 
 def types():

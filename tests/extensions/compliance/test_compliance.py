@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import kincheck
@@ -15,8 +16,10 @@ from kincheck.core.errors import KincheckError
 from kincheck.core.extensions.compliance.released import released
 from kincheck.core.extensions.compliance.section import rig_of
 from kincheck.core.extensions.compliance.study import compliance
+from kincheck.core.extensions.statics.equilibrium import StaticModel
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.mechanism.loads import Bushing
+from kincheck.core.mechanism.mechanism import Point
 
 from ...kinematics.test_bushings import bushed
 from ...support.engine_motion import SIMULATORS, installed
@@ -122,12 +125,54 @@ def test_travel_unit_of_one_end_suffices(tmp_path, travel):
     assert found["loads"]["lateral"]["lateral"] == [-1000.0, 0.0, 1000.0]
 
 
+@pytest.mark.parametrize(
+    ("travel", "first", "count"),
+    [("10mm:3", -0.01, 3), ("10mm", -0.01, 25), ("0", 0.0, 1), ("0:10mm", 0.0, 25)],
+)
+def test_travel_is_spelled_as_in_run(tmp_path, travel, first, count):
+    out = tmp_path / "out.json"
+    assert main(["kc", strut_file(tmp_path), f"--travel={travel}", "--json", str(out)]) == 0
+    found = json.loads(out.read_text())["travel"]
+    assert (found[0], len(found)) == (first, count)
+
+
 def test_kc_constant_load_acts_over_travel(tmp_path):
     """Loads at the contact, as the data have them, with a drive on the wheel carrier."""
     row = STRUT["results"][2]
     found = compliance(strut(tmp_path, OUTBOARD), [row["travel"]], loads_of(row)).travel
     assert found.wheel_center[0] == pytest.approx(row["wheel_center"], abs=1e-14)
     assert found.wheel_load[0] == pytest.approx(row["wheel_load"], abs=1e-9)
+
+
+LOADS = product(["lateral", "longitudinal", "braking", "aligning"], ["iso8855", "sae_j670"])
+
+
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("given", [*LOADS], ids=str)
+def test_slopes_by_load_equal_differences(tmp_path, given):
+    load, convention = given
+    case = strut(tmp_path, WHEEL.replace("CONVENTION", convention))
+    results = compliance(case, [0.0], {load: [-1.0, 0.0, 1.0]})
+    curve = results.loads[load]
+    suffix = "torque" if load == "aligning" else "force"
+    for name in ("toe", "camber"):
+        slope = curve.outputs[f"{name}.per_{load}_{suffix}"].values[1]
+        low, _, high = curve.outputs[name].values
+        assert slope == pytest.approx(0.5 * (high - low), rel=1e-5)
+    # a force to the left moves the wheel to the left: positive y in ISO 8855
+    if load == "lateral":
+        moved = curve.wheel_center[2, 1] - curve.wheel_center[0, 1]
+        assert moved > 0.0 if convention == "iso8855" else moved < 0.0
+
+
+def test_slope_by_travel_of_soft_suspension(tmp_path):
+    case = strut(tmp_path, WHEEL.replace("CONVENTION", "iso8855"))
+    found = compliance(case, [-1e-4, 0.0, 1e-4]).travel
+    low, _, high = found.outputs["toe"].values
+    slope = found.outputs["toe.per_travel"].values[1]
+    assert slope == pytest.approx((high - low) / 2e-4, rel=1e-6)
+    low, _, high = found.rigid["toe"]
+    assert slope != pytest.approx((high - low) / 2e-4, rel=1e-3)
 
 
 def test_axle_wheel_rates_heave_and_roll():
@@ -148,6 +193,26 @@ def test_axle_wheel_rates_heave_and_roll():
     rolled = compliance(case, [0.02], axle="roll").travel
     assert rolled.wheel_center[0, 2] == pytest.approx(found.travel.wheel_center[1, 2], abs=1e-12)
     assert rolled.wheel_load[0] > found.travel.wheel_load[1]  # the bar is twisted
+
+
+@pytest.mark.nightly
+def test_free_axle_compliance_equals_data():
+    """Both wheels are free in height; loads and displacements at their centres."""
+    rows = AXLE["rows"]
+    soft = released(load_case(AXLE_CASE).mechanism)
+    object.__setattr__(soft, "drivers", ())
+    x, y, z = AXLE["points"]["wc"]
+    ends = {"l": ("up_l", (x, y, z)), "r": ("up_r", (x, -y, z))}
+    model = StaticModel(soft, [Point(name, *end) for name, end in ends.items()])
+    load = np.array([[0.0, 0.0, rows["static_wheel_load"], 0.0, 0.0, 0.0]])
+    found = model.solve({"l": load, "r": load}, {})
+    motions = [[found.motion(found.by_load[k][0], *end)[0] for k in ends] for end in ends.values()]
+    C = np.block(motions)
+    assert 1.0 / (C[2, 2] + C[2, 8]) == pytest.approx(rows["wheel_rate_parallel"], rel=1e-9)
+    assert C[0, 0] + C[0, 6] == pytest.approx(rows["wheel_center_x_compliance"], rel=1e-9)
+    assert C[5, 5] + C[5, 11] == pytest.approx(rows["aligning_steer_compliance"], rel=1e-9)
+    lateral = rows["lateral_steer_compliance_at_wheel_center"]
+    assert C[5, 1] + C[5, 7] == pytest.approx(lateral, rel=1e-9)
 
 
 def test_travel_beyond_equilibrium_is_error(tmp_path, capsys):
@@ -232,6 +297,41 @@ def test_released_joint_with_held_driver_refused(tmp_path):
         compliance(load_case(file))
 
 
+def test_bushing_file_for_hardpoint_table(tmp_path, capsys):
+    table, rubber = tmp_path / "car.csv", tmp_path / "rubber.toml"
+    assert main(["templates", "double_wishbone"]) == 0
+    table.write_text(capsys.readouterr().out)
+    rubber.write_text(
+        "".join(
+            bushing_table(arm, end, ["ground", arm[:3]], place, np.eye(3), [5e6] * 3, [50.0] * 3)
+            for arm, ends in HINGES.items()
+            for end, place in ends.items()
+        )
+    )
+    out = tmp_path / "out.json"
+    options = ["--bushings", str(rubber), "--travel=-0.03:0.03:3", "--json", str(out)]
+    assert main(["kc", str(table), *options]) == 0
+    assert "  -0  " not in capsys.readouterr().out
+    found = json.loads(out.read_text())
+    assert found["wheel_load"][1] == pytest.approx(0.0, abs=1e-6)  # it has no spring and no mass
+    C = np.array(found["compliance"][1])
+    assert np.abs(C - C.T).max() <= 1e-12 * np.abs(C).max()
+    assert C[1, 1] > 1e-8
+    assert main(["kc", str(table), *options, "--travel=30mm:30mm:1"]) == 0
+    alone = json.loads(out.read_text())
+    assert alone["travel"] == [0.03]
+    assert alone["wheel_center"][0] == pytest.approx(found["wheel_center"][2], abs=1e-12)
+    rubber.write_text(rubber.read_text().replace("lca_pivot", "lower_pivot"))
+    assert main(["kc", str(table), *options]) == 2
+    assert "'lower_pivot'" in capsys.readouterr().err
+
+
+HINGES = {
+    "uca_pivot": {"front": (0.09, 0.26, 0.285), "rear": (-0.11, 0.265, 0.28)},
+    "lca_pivot": {"front": (0.12, 0.21, 0.125), "rear": (-0.13, 0.215, 0.12)},
+}
+
+
 @pytest.fixture(scope="module")
 def load_cases(tmp_path_factory):
     """The four load cases of the data as equilibria for engines, with their results."""
@@ -251,6 +351,21 @@ def test_engine_equilibria_equal_data(load_cases, name):
         center = found.points["wheel_center"].position[0]
         assert center == pytest.approx(row["wheel_center"], abs=1e-12)
         assert found.forces.drivers["stroke"][0] == pytest.approx(row["wheel_load"], abs=4e-6)
+
+
+@pytest.mark.nightly
+def test_engine_verdicts_on_axle(tmp_path, capsys):
+    """Both wheels against each other, with an anti-roll bar."""
+    names = ["mujoco", "exudyn-static"]
+    for name in names:
+        engine_of(name)
+    options = ["--travel=-60mm:50mm:2", "--axle=roll", "--jobs=0", "--engine", *names]
+    out = tmp_path / "kc.json"
+    assert main(["kc", str(AXLE_CASE), *options, f"--json={out}"]) == 0
+    for row in json.loads(out.read_text())["agreement"][1:]:
+        assert row["outcome"] == "pass"
+        assert row["wheel_center"] <= 1e-12
+        assert row["wheel_load"] <= 1e-5
 
 
 def engine_of(name):

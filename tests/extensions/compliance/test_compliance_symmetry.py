@@ -2,16 +2,102 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
+from kincheck.core.extensions.compliance.section import Rig
 from kincheck.core.extensions.compliance.study import compliance
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES
+from kincheck.core.mechanism.loads import SpringDamper
+from kincheck.core.mechanism.mechanism import GROUND
+
+ODD = (
+    "roll_angle",
+    "mean_steer_angle",
+    "axle_roll_center_offset",
+    "rack_travel",
+    ".y",
+)
+"""Ends of the names of outputs that the mirror image turns round."""
+STOP = ((-0.1, 0.0), (0.0, 0.0), (0.01, 400.0), (0.03, 4000.0))
 
 
 def exchanged(name):
     return name.replace("left", "@").replace("right", "left").replace("@", "right")
+
+
+def axle_of(folder, template, capsys, motion):
+    """Return an axle on bushings, with bump stops, tires, and springs across in place of a bar."""
+    files = folder / "car.csv", folder / "rubber.toml"
+    for file, more in zip(files, ([], ["--bushings"]), strict=True):
+        assert main(["templates", template, *more]) == 0
+        file.write_text(capsys.readouterr().out)
+    case = load(files[0], Supplied(axle=motion, bushings=files[1], wheelbase="2.6"))
+    mechanism = case.mechanism
+    ends = [mechanism.point(f"{side}_wheel_center") for side in ("left", "right")]
+    springs = [
+        SpringDamper(
+            f"{end.name} spring",
+            end.body,
+            GROUND,
+            (end.position, tuple(np.add(end.position, (0.02, 0.0, 0.5)).tolist())),
+            2e4,
+            curve=tuple((-x, -force) for x, force in STOP[::-1]),
+        )
+        for end in ends
+    ]
+    # each spring from the centre of a wheel to below the other: a bushing has axes of one body
+    below = [tuple(np.add(end.position, (0.0, 0.0, -0.1)).tolist()) for end in ends]
+    springs += [
+        SpringDamper(
+            f"bar {k}", ends[k].body, ends[1 - k].body, (ends[k].position, below[1 - k]), 4e4
+        )
+        for k in range(2)
+    ]
+    mechanism = replace(mechanism, forces=(*mechanism.forces, *springs))
+    return replace(case, mechanism=mechanism, tables={"compliance": Rig(tire_stiffness=2e5)})
+
+
+DAILY = {("mcpherson", "steer"), ("five_link", "roll"), ("semi_trailing_arm", "heave")}
+"""Axles that are solved by day: with a strut, with rods and with an arm."""
+MOTIONS = [
+    pytest.param(name, motion, marks=() if (name, motion) in DAILY else pytest.mark.nightly)
+    for name, template in TEMPLATES.items()
+    for motion in ("heave", "roll", "steer")
+    if motion != "steer" or template.steered
+]
+
+
+@pytest.mark.parametrize(("template", "motion"), MOTIONS)
+def test_symmetric_axle_outputs_are_symmetric(template, motion, tmp_path, capsys):
+    case = axle_of(tmp_path, template, capsys, motion)
+    curves = compliance(case, np.array([-0.02, -0.01, 0.0, 0.01, 0.02]), axle=motion).travel
+    assert not curves.failures
+    outputs = curves.outputs
+    asked = {output.name for output in case.outputs}
+    assert asked == {name for name in asked if name in outputs} | {*curves.not_computed}
+    turned = slice(None, None, 1 if motion == "heave" else -1)
+    for name, curve in outputs.items():
+        mirrored = outputs[exchanged(name)].values[turned]
+        # bushings of 1e7 N/m leave 1e-9 of it in rates, and less in all that is smaller
+        size = max(float(np.nanmax(np.abs(curve.values), initial=0.0)), 1e-3)
+        off = [np.abs(curve.values - sign * mirrored) / size for sign in (1.0, -1.0)]
+        even, odd = (float(np.nanmax(x, initial=0.0)) for x in off)
+        assert (np.isfinite(curve.values) == np.isfinite(mirrored)).all(), name
+        if motion == "heave" or "_force" in name or "_torque" in name:
+            # a load has the opposite sense on the other wheel, and its slope may be odd
+            assert min(even, odd) < 1e-6, name
+        elif name.partition(".per_travel")[0].endswith(ODD):
+            assert odd < 1e-6, name
+        else:
+            assert even < 1e-6, (name, curve.values)
+    for name in ("roll_stiffness", "roll_rate", "ride_rate", "anti_roll_share"):
+        assert np.ptp(outputs[name].values) > 0.0
 
 
 # Trailing arms about y, with their own bump stops and a bar, by hand

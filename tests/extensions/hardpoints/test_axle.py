@@ -141,6 +141,26 @@ def test_axle_outputs_in_closed_form(tmp_path, name, motion):
         assert np.isfinite(np.delete(found["ackermann"], 2)).all()
 
 
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
+def test_axle_outputs_in_other_engines(tmp_path, name):
+    pytest.importorskip(name)
+    case = axle(tmp_path, "double_wishbone", "roll", "0.03:5")
+    found, native = answer(case, name), answer(case)
+    for output in case.outputs:
+        off = np.abs(found[output.name] - native[output.name]).max()
+        assert off < 1e-10, output.name
+
+
+def test_axle_in_heave_equals_one_wheel(tmp_path):
+    """The roll centre of the axle is that of either wheel; half a track is of one wheel."""
+    found = answer(axle(tmp_path, "double_wishbone", "heave"))
+    height = found["axle_roll_center_height"]
+    assert np.abs(height - found["left_roll_center_height"]).max() < CLOSE
+    assert np.abs(height - found["right_roll_center_height"]).max() < CLOSE
+    assert np.abs(found["left_toe"] - found["right_toe"]).max() < CLOSE
+    assert np.abs(found["axle_roll_center_offset"]).max() < CLOSE
+
+
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_axle_points_mirror_one_wheel(tmp_path, name):
     """As those of one wheel, mirrored for the right; what is fixed stays so, steered or not."""
@@ -156,6 +176,13 @@ def test_axle_points_mirror_one_wheel(tmp_path, name):
             assert body == (point.body if point.body == "ground" else f"{side}_{point.body}")
             assert position == pytest.approx((x, sign * y, z), abs=1e-15)
     assert not found
+
+
+def test_axle_without_steering(tmp_path):
+    case = axle(tmp_path, "three_link", "roll")
+    assert [driver.name for driver in case.mechanism.drivers] == ["left_stroke", "right_stroke"]
+    found = answer(case)
+    assert np.abs(found["left_camber"] - found["right_camber"][::-1]).max() < CLOSE
 
 
 def test_trailing_arms_have_no_roll_centre(tmp_path):
@@ -259,6 +286,15 @@ def test_axle_steered_during_travel(tmp_path, motion, position):
     assert np.isfinite(found["ackermann"]).any()
 
 
+def test_anti_outputs_need_vehicle_data(tmp_path):
+    names = {each.name for each in load(table(tmp_path)).outputs}
+    assert not [name for name in names if "anti" in name]
+    said = Supplied(position="front", wheelbase="2.6", cg_height="0.5")
+    names = {each.name for each in load(table(tmp_path), said).outputs}
+    assert "wheelbase_change" in names
+    assert not [name for name in names if "anti" in name]
+
+
 OPTION_FAULTS = """
 axle | axle=pitch | --axle ... 'pitch' ... heave
 wheelbase | axle=steer wheelbase=two | --wheelbase ... 'two' ... a length
@@ -329,6 +365,21 @@ def plain(folder, name, corner, *above):
 def of(name, **own):
     steered = {} if TEMPLATES[name].steered else {"rack": None}
     return replace(SAID, template=name, **{**steered, **own})
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_right_wheel_outputs_mirror_left(tmp_path, name):
+    """The rack moves to the other side for the mirror image."""
+    left = load(plain(tmp_path, name, "FL"), of(name))
+    other_way = {"rack": "0.01:-0.01"} if TEMPLATES[name].steered else {}
+    right = load(plain(tmp_path, name, "FR"), of(name, **other_way))
+    theirs, ours = solved(left), solved(right)
+    assert theirs.keys() == ours.keys()
+    assert [note for note in right.assembly if "right of the middle" in note]
+    mirrored = {each for each in ours if each.endswith((".y", "_y"))}
+    for output, values in ours.items():
+        expected = -theirs[output] if output in mirrored else theirs[output]
+        np.testing.assert_allclose(values, expected, rtol=CLOSE, atol=CLOSE, err_msg=output)
 
 
 def test_side_comment_in_hardpoint_table(tmp_path):

@@ -1,7 +1,9 @@
 """From public tables to curves: sweeps of other programs, and independent solutions."""
 
 import csv
+import math
 
+import kincheck.cases
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
@@ -149,6 +151,45 @@ def test_formula_student_pushrod_corner():
         assert found["spring_ratio"][k] == pytest.approx(-rate, abs=1e-8)
 
 
+STRUT = """# template: mcpherson
+# units: m
+# axes: rearward,left,up
+name,x,y,z
+lca_front,1.07,0.353,0.005
+lca_rear,1.27,0.353,0.005
+lca_outer,0.9676,0.66,-0.01
+strut_lower,0.97772,0.605,0.18
+strut_upper,1.0,0.55,0.6
+tierod_inner,1.14,0.355,0.1455
+tierod_outer,1.115,0.665,0.118
+wheel_center,0.975,0.715,0.101
+"""
+"""Points of the built-in case mcpherson_suspension, mirrored to the left by their axes."""
+ROAD = ("scrub_radius", "mechanical_trail", "roll_center_height", "half_track_change")
+
+
+def test_mcpherson_strut_to_50_digits(tmp_path):
+    """Against 50 digits of an independent solution; see the head of the built-in table."""
+    file = tmp_path / "strut.csv"
+    file.write_text(STRUT)
+    found = curves(load(file, Supplied(travel="0.08:33", wheel_radius="0.3")))
+    lines = kincheck.cases.file("mcpherson_suspension").with_suffix(".csv").read_text().splitlines()
+    rows = [*csv.DictReader(line for line in lines if not line.startswith("#"))]
+    for name in ("toe", "camber", "caster", "kingpin_inclination", *ROAD):
+        true = np.array([float(row[name]) for row in rows])
+        assert np.abs(found[name] - true).max() < 1e-13, name
+
+
+def test_wishbone_explorer_csv_by_command(tmp_path, explorer):
+    """The curves leave as a table; there is nothing to compare a single engine with."""
+    options = ["--travel=-0.04:0.12:3", "--rack", "0.04", "--wheel-radius", str(RADIUS)]
+    file, out = str(DATA / "wishbone_explorer.csv"), tmp_path / "curves.csv"
+    assert main(["run", file, "--engine", "native", "--csv", str(out), *options]) == 2
+    rows = csv.DictReader(out.read_text().splitlines())
+    toe = [math.radians(float(row["toe [deg]"])) for row in rows]
+    assert toe == pytest.approx(explorer["toe"][::20], abs=1e-13)
+
+
 def test_measured_camber_definition_is_named(tmp_path, published, capsys):
     """Compared as it stands, the camber is off, and the message states its other definition."""
     sweep = tmp_path / "sweep.csv"
@@ -179,6 +220,24 @@ def test_chrono_static_toe_and_camber(tmp_path):
     found = solved(load(file, Supplied(travel="0.02:3")))
     assert found["toe"][1] == pytest.approx(np.arctan2(x, y), abs=1e-15)
     assert found["camber"][1] == pytest.approx(np.arcsin(-z), abs=1e-15)
+
+
+def test_chrono_strut_with_wheel_radius():
+    """Toe, camber and half track from 40-digit centres and spin axes; see test_hardpoints."""
+    said = Supplied(travel="0.07:15", wheel_radius="0.4")
+    found = solved(load(DATA / "chrono_macpherson_strut.json", said))
+    lines = (DATA / "chrono_sweeps.csv").read_text().splitlines()
+    truth = [line.split(",")[1:] for line in lines if line.startswith("chrono_macpherson_strut,")]
+    _, _, y, _, *s = np.array(truth, dtype=float).T
+    level = np.hypot(s[0], s[1])
+    track = y + 0.4 * s[1] * s[2] / level
+    true = {
+        "toe": np.arctan2(s[0], s[1]),
+        "camber": np.arctan2(-s[2], level),
+        "half_track_change": track - track[7],
+    }
+    for name, values in true.items():
+        assert found[name] == pytest.approx(values, abs=1e-14)
 
 
 def test_chrono_semi_trailing_arm_outputs():

@@ -1,6 +1,7 @@
 """Suspension outputs: formulas, conventions of signs, and samples without a value."""
 
 import csv
+import tomllib
 from dataclasses import replace
 from itertools import islice
 
@@ -35,7 +36,7 @@ from kincheck.core.mechanism.motions import JointAngle
 from mpmath import mpf
 
 from ...oracles import strut_oracle
-from ...support.suspension_files import STRUT, loaded, unreferenced
+from ...support.suspension_files import AXES, STRUT, loaded, mirrored, unreferenced
 
 TOL = 1e-12
 ROUND_OFF = 1e-14
@@ -282,8 +283,42 @@ def test_strut_reference_matches_sixty_digits():
             assert abs(mpf(written[name]) - value) <= mpf("1e-16") * abs(value) + mpf("1e-40"), name
 
 
+# Spin axis of Project Chrono's generic MacPherson strut (BSD-3-Clause) over the stroke: a solution
+# of its rods and its strut's line to 40 digits that shares nothing with this project. A left wheel,
+# x forward, y left, z up.
+CHRONO = {
+    -0.07: (0.036703185761281249241, 0.99905916117216708365, -0.023101269076367991694),
+    -0.02: (0.011149989625884017296, 0.99992233617913548656, -0.0055677052187265087943),
+    0.01: (-0.0058210759742222245227, 0.99998009489428534666, 0.0024341096356585819382),
+}
+
+
+def test_chrono_strut_toes_out_in_jounce():
+    data = tomllib.loads((cases.FOLDER / "chrono_macpherson.toml").read_text())
+    data |= {
+        "suspension": AXES | {"side": "left"},
+        "outputs": {"toe": {"type": "toe"}, "camber": {"type": "camber"}},
+    }
+    case = loaded(unreferenced(data))
+    case = replace(case, sweep=replace(case.sweep, values=np.array([*CHRONO])))
+    found = solved(case)
+    x, y, z = np.array([*CHRONO.values()]).T
+    assert_positions(found, {"toe": np.arctan(x / y), "camber": -np.arcsin(z)})
+
+
 ONE_SIGN = {"steer_angle", "wheel_center_y"}
 """Outputs that tell left from right, or one convention from the other."""
+
+
+def test_mirror_image_gives_other_wheel():
+    right, left = solved(loaded(STRUT)), solved(loaded(mirrored(STRUT)))
+    assert right.keys() == left.keys()
+    for name, series in right.items():
+        sign = -1.0 if name.split(".")[0] in ONE_SIGN else 1.0
+        assert left[name].position == pytest.approx(sign * series.position, abs=ROUND_OFF)
+        if series.velocity is not None:
+            assert left[name].velocity == pytest.approx(sign * series.velocity, abs=ROUND_OFF)
+    assert np.ptp(right["toe"].position) > 0.05  # and it is no strut at rest
 
 
 def test_sae_convention_turns_lateral_outputs():
@@ -302,6 +337,15 @@ def test_sae_convention_turns_lateral_outputs():
     assert {name for name, sense in senses[0].items() if senses[1][name] != sense} == {
         name for name in found if name.split(".")[0] in ONE_SIGN
     }
+
+
+def test_suspension_outputs_in_other_axes():
+    """The same car drawn with x to the left, y rearward and z up, or with z down."""
+    for turn in (np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.diag([1, -1, -1])):
+        turned = mirrored(STRUT, turn)
+        turned["suspension"] |= {"side": "right"}
+        true = {name: series.position for name, series in solved(loaded(STRUT)).items()}
+        assert_positions(solved(loaded(turned)), true)
 
 
 def test_slopes_need_velocities():
@@ -427,6 +471,19 @@ def test_reference_samples_by_arm_closed_form(name):
             truth = getattr(case.reference[output], order)
             off = np.abs(values - truth).max() / max(1.0, np.abs(truth).max())
             assert off <= limit, (output, order)
+
+
+def test_decompositions_share_reference():
+    for one, other in (
+        ("chrono_macpherson", "chrono_macpherson_cylindrical"),
+        ("chrono_multi_link", "chrono_multi_link_bodies"),
+    ):
+        (first, second) = (cases.load(name) for name in (one, other))
+        assert {type(joint) for joint in first.mechanism.joints} != {
+            type(joint) for joint in second.mechanism.joints
+        }
+        for name, series in first.reference.items():
+            assert (series.position == second.reference[name].position).all()
 
 
 # The multi-link by five distances

@@ -19,7 +19,8 @@ from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
-from scipy.optimize import minimize_scalar
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq, minimize_scalar
 
 from ...oracles.naive import tilde
 from ...support.mechanisms import ORIGIN, X, Z
@@ -83,6 +84,58 @@ def test_compliance_is_inverse_bushing_stiffness():
 
 
 ARM = Mechanism("arm", [Body("arm")], [Revolute("hinge", GROUND, "arm", ORIGIN, Z)])
+STOP = ((-0.1, -100.0), (0.0, 0.0), (0.1, 100.0), (0.1001, 120.0), (0.2, 18100.0))
+PROGRESSIVE = PchipInterpolator(*np.array(STOP).T)
+
+
+ELEMENTS = {
+    # k sin(th) = F a cos(th)
+    "torsion": (
+        Bushing("t", GROUND, "arm", ORIGIN, turning_stiffness=(0.0, 0.0, 500.0)),
+        300.0,
+        math.atan(300.0 * 0.4 / 500.0),
+    ),
+    # k b sin(th) b cos(th) = F a cos(th)
+    "side": (
+        Bushing("s", GROUND, "arm", (0.25, 0.0, 0.0), stiffness=(0.0, 2e5, 0.0)),
+        8000.0,
+        math.asin(8000.0 * 0.4 / (2e5 * 0.25**2)),
+    ),
+    # k th = F a cos(th)
+    "coil": (
+        TorsionSpringDamper("c", "hinge", 500.0),
+        900.0,
+        brentq(lambda x: 500.0 * x - 900.0 * 0.4 * math.cos(x), 0.0, 1.5, xtol=1e-15),
+    ),
+    # progressive(b sin(th)) b cos(th) = F a cos(th), beyond the stop at 0.1 m
+    "stop": (
+        Bushing("b", GROUND, "arm", (0.25, 0.0, 0.0), curve=((), STOP, ())),
+        400.0,
+        math.asin(brentq(lambda x: PROGRESSIVE(x) * 0.25 - 160.0, 0.0, 0.2, xtol=1e-16) / 0.25),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ELEMENTS)
+def test_equilibrium_angle_of_loaded_arm(name):
+    element, load, angle = ELEMENTS[name]
+    model = StaticModel(replace(ARM, forces=[element]), [Point("tip", "arm", (0.4, 0.0, 0.0))])
+    found = model.solve({"tip": np.array([[0.0, load, 0.0, 0.0, 0.0, 0.0]])}, {})
+    assert found.reached.all()
+    x, y, _ = found.direction("arm", X)[0]
+    assert math.atan2(y, x) == pytest.approx(angle, abs=1e-14)
+
+
+def test_load_at_elastic_centre_only_translates():
+    places = [(0.3, 0.0, 0.0), (-0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.3, 0.0)]
+    bushings = [
+        Bushing(f"b{k}", GROUND, "block", place, stiffness=(1e5, 2e5, 3e5), turning_stiffness=10.0)
+        for k, place in enumerate(places)
+    ]
+    load = np.array([[5e4, -3e4, 2e4, 0.0, 0.0, 0.0]])
+    found = block(bushings).solve({"o": load}, {})
+    assert found.place("block", ORIGIN)[0] == pytest.approx([0.125, -0.0375, 1.0 / 60.0], abs=1e-16)
+    assert found.bodies["block"].p[0] == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-16)
 
 
 @pytest.mark.parametrize(
@@ -169,6 +222,23 @@ def strut(factor=1.0, turning=1.0, rigid=False):
     return StaticModel(mechanism, [Point("patch", "knuckle", patch)]), facts
 
 
+def test_strut_equilibrium_agrees_with_simulators():
+    model, facts = strut()
+    rows = facts["results"]
+    loads = np.array([each["load_at_contact_patch"] for each in rows])
+    found = model.solve({"patch": loads}, {"stroke": np.array([each["travel"] for each in rows])})
+    expected = [each["wheel_center"] for each in rows]
+    assert np.abs(found.place("knuckle", facts["wheel_center"]) - expected).max() <= 1e-15
+    axes = [each["spin_axis"] for each in rows]
+    assert np.abs(found.direction("knuckle", facts["spin_axis"]) - axes).max() <= 1e-14
+    wheel = [each["wheel_load"] for each in rows]
+    assert found.efforts["stroke"] == pytest.approx(wheel, abs=1e-10)
+    patch = tuple(facts["contact_patch"])
+    for C, each in zip(compliance(found, "patch", "knuckle", patch), rows, strict=True):
+        given = np.array(each["compliance_contact_patch"])
+        assert np.abs(C - given).max() <= 1e-14 * np.abs(given).max()
+
+
 def test_equilibrium_blocks_equal_single_samples():
     """Samples are solved in blocks, whose programs keep nothing of those before."""
     model, _ = strut()
@@ -184,6 +254,16 @@ def test_equilibrium_blocks_equal_single_samples():
     resting = model.solve({}, {"stroke": travel[:1]})
     still = model.solve({"patch": np.zeros((1, 6))}, {"stroke": travel[:1]})
     assert resting.efforts["stroke"][0] == pytest.approx(still.efforts["stroke"][0], abs=1e-10)
+
+
+def test_wheel_rate_is_wheel_load_derivative():
+    model, _ = strut()
+    travel, h = np.array([-0.03, 0.0, 0.04]), 1e-4
+    loads = {"patch": np.zeros((3, 6))}
+    found = model.solve(loads, {"stroke": travel})
+    ends = [model.solve(loads, {"stroke": travel + x}).efforts["stroke"] for x in (h, -h)]
+    expected = (ends[0] - ends[1]) / (2.0 * h)
+    assert found.by_driver["stroke"][1][:, 0] == pytest.approx(expected, rel=1e-6)
 
 
 def test_stiff_bushings_approach_rigid_mechanism():
@@ -203,6 +283,25 @@ def test_stiff_bushings_approach_rigid_mechanism():
         assert found.efforts["stroke"][0] == pytest.approx(row["wheel_load"], abs=2e-8)
     scaled = np.linalg.norm(place - rigid) * row["scale"]
     assert scaled == pytest.approx(8.60778e-4, rel=1e-5)
+
+
+def test_load_work_is_stored_energy():
+    """Gauss's rule over the ramp; the energy is written down in terms of places alone."""
+    facts = read("1_body_on_three_bushings.json")
+    bushings = three(facts)
+    load = 2.0 * np.array(facts["finite_load"])
+    load[3:] = 0.0
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    shares = np.append(0.5 * (nodes + 1.0), 1.0)
+    found = block(bushings).solve({"o": shares[:, None] * load}, {})
+    C = compliance(found)[:8]
+    work = 0.5 * np.sum(weights * shares[:8] * np.einsum("i,nij,j->n", load, C, load))
+    energy = 0.0
+    for each in bushings:
+        moved = np.array(each.triad) @ (found.place("block", each.point)[-1] - each.point)
+        turned = 2.0 * np.array(each.triad) @ found.bodies["block"].p[-1, 1:]
+        energy += 0.5 * (each.stiffness @ moved**2 + each.turning_stiffness @ turned**2)
+    assert work == pytest.approx(energy, rel=1e-13)
 
 
 def test_unheld_body_is_named():

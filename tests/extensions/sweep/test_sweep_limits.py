@@ -18,14 +18,16 @@ from kincheck.core.case.io.case_file import case_text
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.extensions.sweep.conformance import sparkline
+from kincheck.core.extensions.sweep.cross_check import Check
 from kincheck.core.extensions.sweep.page import page
 from kincheck.core.extensions.sweep.study import Ready, RowLimit, Study, limit_counts
 from kincheck.core.extensions.sweep.study_choices import Incomplete, Sampling
 from kincheck.core.extensions.sweep.sweep import sweep_designs
-from kincheck.core.extensions.sweep.tables import limit_notes, print_sweep, remarks
+from kincheck.core.extensions.sweep.tables import limit_notes, limits_csv, print_sweep, remarks
 from kincheck.core.extensions.sweep.variation import FileUnits, Limit
 from kincheck.core.extensions.sweep.variation_file import limits_of_texts, read_variation
 from kincheck.core.harness.compare import output_series
+from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Distance, Revolute
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
@@ -169,6 +171,22 @@ def test_limits_with_own_unit(limit, low, high):
     (found,) = limits_of_texts([limit], load("mcpherson_suspension"), FileUnits("mm", "rad"))
     ends = [math.radians(low), math.radians(high)]
     assert [found.low, found.high] == pytest.approx(ends, rel=1e-15)
+
+
+def test_limits_of_table_in_degrees(tmp_path, capsys):
+    main(["templates", "mcpherson"])
+    car, out = tmp_path / "car.csv", tmp_path / "out"
+    car.write_text(capsys.readouterr().out)
+    rows = {"ball": {"at": "lca_outer", "sigma": 1.0}}
+    varied = vary_file(tmp_path, rows, units={"length": "mm"})
+    said = ["--limit", "toe:-1.5:3", "--output", "toe", "--samples", "20", "--out", str(out)]
+    assert main(["sweep", str(car), "--vary", str(varied), *said]) == 0
+    (limit, _) = json.loads((out / "sweep.json").read_text())["limits"]
+    assert [limit["low"], limit["high"]] == pytest.approx(np.radians([-1.5, 3.0]), rel=1e-15)
+    with (out / "limits.csv").open() as lines:
+        row = next(csv.DictReader(lines))
+    assert row["unit"] == "deg"
+    assert [float(row["low"]), float(row["high"])] == pytest.approx([-1.5, 3.0])
 
 
 @pytest.mark.parametrize("limit", ["toe:-2:2mm", "toe:-2deg:2rad", "toe:-2:2dgr", "toe:deg:deg"])
@@ -360,6 +378,20 @@ def test_printed_limits_equal_results(studied, judgement, cells, changed):
         ]
 
 
+def test_limits_csv_equals_results(studied):
+    for judgement, results in studied[0].items():
+        for row, each in zip(
+            csv.DictReader(io.StringIO(limits_csv(results))), results.limits, strict=True
+        ):
+            assert float(row["yield"]) == each.share
+            assert (float(row["yield_from"]), float(row["yield_to"])) == each.interval
+            assert float(row["yield_of_all"]) == each.share_of_all
+            assert float(row["yield_of_complete"]) == each.share_of_complete
+            counts = ("known", "below", "above", "outside", "incomplete")
+            assert [int(row[key]) for key in counts] == [getattr(each, key) for key in counts]
+        assert results.incomplete == judgement
+
+
 @pytest.mark.parametrize(
     ("option", "judgement", "words"),
     [
@@ -421,6 +453,13 @@ def test_sweep_forces_equal_single_variants(tmp_path, name):
     assert not np.isclose(found[:, :, 0], found[:, :, 1], rtol=1e-6).all(axis=1).any()
 
 
+def test_units_of_varied_stiffness_and_mass(tmp_path):
+    case = load("mcpherson_strut_loaded")
+    rate, mass, *_ = vary(tmp_path, case, **LOADED["mcpherson_strut_loaded"]).coordinates
+    assert (rate.unit, mass.unit) == ("N/m", "kg")
+    assert rate.scale == pytest.approx(2000.0)  # of N/mm
+
+
 def test_possibly_negative_mass_is_refused(tmp_path):
     case = load("planar_slider_crank")
     mass = case.mechanism.body("slider").mass
@@ -428,6 +467,30 @@ def test_possibly_negative_mass_is_refused(tmp_path):
         vary(tmp_path, case, mass={"at": "bodies.slider.mass", "sigma": mass / 5.0})
     with pytest.raises(CaseError, match="vary it less"):
         vary(tmp_path, case, mass={"at": "bodies.slider.mass", "half_width": 2.0 * mass})
+
+
+def test_force_study_is_linear_in_mass(tmp_path):
+    """A force is linear in a mass: mean, extremes and gradient follow from two runs."""
+    case = load("planar_slider_crank")
+    mass = {"mass": {"at": "bodies.slider.mass", "half_width": 0.1}}
+    found = sweep_designs(
+        case,
+        vary(tmp_path, case, **mass),
+        samples=20,
+        seed=1,
+        check=Check(adapters.engine("native"), 0.05, solve_in_process, 1e-12),
+    )
+    assert [each.outcome.value for each in found.checked] == ["pass"]
+    torque = found.outputs["crank_torque"]
+    assert torque.unit == "N m"
+    (slope,) = [each for each in found.gradients if each.output == "crank_torque"]
+    assert slope.unit == "(N m)/kg"
+    assert abs(slope.largest) > 1e-3  # the torque carries the mass
+    offsets = vary(tmp_path, case, **mass).offsets(1, 0, 20)[0]
+    ends = np.array(torque.nominal) + np.outer([offsets.min(), offsets.max()], slope.along)
+    size = np.abs(torque.nominal).max()
+    np.testing.assert_allclose(torque.min, ends.min(axis=0), atol=1e-9 * size)
+    np.testing.assert_allclose(torque.max, ends.max(axis=0), atol=1e-9 * size)
 
 
 def test_force_study_prints_file_units(tmp_path, capsys):

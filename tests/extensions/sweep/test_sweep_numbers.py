@@ -46,6 +46,19 @@ def study(folder, mode, **options):
     return json.loads(to_json(results)), text.getvalue(), Page(page(results))
 
 
+def test_study_dataset_and_summary_equal_json(tmp_path):
+    case = load("mcpherson_strut")
+    results = sweep_designs(case, variation(tmp_path, "one_at_a_time"))
+    found, data = json.loads(to_json(results)), results.dataset()
+    assert results.summary() == "mcpherson_strut, one_at_a_time, 11 variants, 2 outputs"
+    assert [*data.coords["stroke"].values] == found["driver"]["stroke"]
+    for name, each in found["outputs"].items():
+        curves = dict(zip(data.coords["band"].values, data.variables[name].values.T, strict=True))
+        assert {band: values.tolist() for band, values in curves.items()} == {
+            band: each[band] for band in ("nominal", "mean", "min", "max", "standard_deviation")
+        }
+
+
 def effect(gradient):
     return abs(gradient["largest"]) * gradient["deviation"]
 
