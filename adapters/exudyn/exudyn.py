@@ -432,7 +432,7 @@ class ExudynModel:
         unit_rates, bias = v / speed, np.zeros(len(self.kept))
         for h in DIFFERENCES:
             way = zip(*_way(self.q, unit_rates, h * STEPS), strict=True)
-            bias, low = (WEIGHTS / h @ [self._rates(*each) for each in way])[:, self.kept]
+            bias, low = WEIGHTS / h @ [self._rates(*each) for each in way]
             if np.abs(bias - low).max() <= AGREE * max(np.abs(bias).max(), 1.0):
                 break
         # the rows of the normalisation, |p|^2 = 1, stay satisfied on the way by its curvature alone
@@ -445,11 +445,13 @@ class ExudynModel:
         return bias
 
     def _rates(self, q: Array, q_t: Array) -> Array:
-        """Return the rates of all rows of Exudyn's system."""
+        """Return the rates of the rows. What Exudyn has not computed, the other rows of its system,
+        may hold any number, also NaN.
+        """
         self.state.SetODE2Coordinates(q)
         self.state.SetODE2Coordinates_t(q_t)
         self.solver.ComputeAlgebraicEquations(self.mbs, True)
-        return self.solver.GetSystemResidual()
+        return self.solver.GetSystemResidual()[self.kept]
 
     def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
         self.state.SetODE2Coordinates_t(v[: self.coordinates])

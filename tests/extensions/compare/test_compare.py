@@ -176,7 +176,7 @@ def test_compare_in_python_equals_command(tmp_path, old, new):
         assert values == [float(row[f"camber {label} [deg]"]) for row in rows]
     assert "toe of new differs" in found.exceeded[0]
     assert "new against old" in repr(found)
-    assert "<polyline" in found.to_html()
+    assert "<svg xmlns" in found.to_html()
     cases = [kincheck.load(each, travel) for each in (old, new)]
     toe = found.curves["new"]["toe"]
     assert kincheck.compare(*cases).curves["new"]["toe"] == pytest.approx(toe)
