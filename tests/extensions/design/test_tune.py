@@ -1,6 +1,7 @@
 """kincheck tune, against an own double wishbone and another optimiser."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import kincheck
@@ -8,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from kincheck.core.cli.main import main
-from kincheck.core.extensions.design.goals import parts_of
+from kincheck.core.extensions.design.goals import parts_of, unit_in_table
 from kincheck.core.extensions.design.least_move import least_move
 from kincheck.core.extensions.design.new_table import NewTable
 from kincheck.core.extensions.design.rods import with_rods
@@ -93,6 +94,13 @@ def beyond(u):
 def slopes_of(function, u, step=1e-4):
     ways = step * np.eye(len(u))
     return np.array([(function(u + e) - function(u - e)) / (2.0 * step) for e in ways]).T
+
+
+def test_rates_have_units_of_table():
+    """Slopes by travel are per metre, and slopes by load per kN."""
+    case = replace(kincheck.load("four_bar"), length_unit="mm", angle_unit="deg")
+    sizes = {"rad": "deg", "m": "mm", "rad/m": "deg/m", "rad/N": "deg/kN", "m/N": "mm/kN"}
+    assert {si: unit_in_table(si, case).name for si in sizes} == sizes
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import sys
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from time import monotonic
+from time import monotonic, perf_counter
 
 import numpy as np
 import pytest
@@ -382,7 +382,9 @@ def test_check_gives_verdict_per_engine(page):
 def test_slider_pose_closes_loops(tmp_path):
     live = LiveModel(tmp_path / "rssr", load("rssr"))
     (driver,) = live.drivers.values()
+    begin = perf_counter()
     found = live.move(Move(drivers={driver.name: driver.design + 0.3}, measured=True))
+    assert 0.0 < sum(found.milliseconds.values()) < 1e3 * (perf_counter() - begin)
     assert found.share == 1.0
     assert found.distance is not None
     assert found.distance > 0.0

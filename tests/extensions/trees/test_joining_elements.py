@@ -109,6 +109,14 @@ def test_gazebo_or_drake_loop_closes(loop, tmp_path):
     assert expected[[0, -1]] == pytest.approx([-0.10101, 0.090703], abs=5e-6)
 
 
+@pytest.mark.parametrize("tilt", ["0.1", "0.001"])
+def test_tilted_loop_hinge_is_open(tilt, tmp_path):
+    loop = LOOPS["loop_joint with an axis"].replace(
+        'link2 link="follower"', f'link2 link="follower" rpy="{tilt} 0 0"'
+    )
+    refused(lambda: read_inside(tmp_path, loop), "'c': is open")
+
+
 TWO = "names the links 'strut' and 'follower', which it may join, and is not read, expected a"
 COUPLED = "couples the joints 'drive' and 'pivot', and is not read, expected <mimic>"
 JOINING = {
