@@ -203,7 +203,7 @@ class Run(Isolated, _Added, _Formed):  # pyright: ignore[reportUntypedBaseClass]
         self = _with_cases(self, registry)
         plan = _plan_run(self, registry)
         data: list[Any] = [each.efforts(self) for each in asked(sources(RUN), self)]
-        precision = next((each for each in data if each), None)
+        precision = next((each for each in data if each is not None), None)
         with delivery.json_only() if self.json == "-" else nullcontext():
             results, problems, keeping, stopped = _solve(self, plan)
         if self.out or self.json or keeping:

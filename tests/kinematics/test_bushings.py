@@ -20,6 +20,7 @@ from kincheck.core.mechanism.loads import Bushing
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism
 from kincheck.core.primitives.base import Pose
 
+from ..support.engine_motion import ENGINES, installed
 from ..support.loads import solved, traced
 from ..support.mechanisms import ORIGIN
 
@@ -50,6 +51,16 @@ def test_bushing_torque_by_rotation_law(law):
     found = at_pose(element, ORIGIN, rotated(ROTATION))
     assert [*found.wrenches[GROUND].torque] == pytest.approx(TORQUES[law], abs=6e-9)
     assert [*found.wrenches["block"].torque] == pytest.approx([-x for x in TORQUES[law]], abs=6e-9)
+
+
+def test_bushing_force_and_moment_when_displaced():
+    element = Bushing("b", GROUND, "block", ORIGIN, stiffness=(1e5, 2e5, 3e5), preload=(1, 2, 3))
+    found = at_pose(element, (0.003, -0.002, 0.004), rotated(ROTATION))
+    assert [*found.wrenches[GROUND].force] == pytest.approx([301.0, -398.0, 1203.0], rel=1e-14)
+    # the force acts at the second body's point
+    assert [*found.wrenches["block"].torque] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    expected = np.cross([0.003, -0.002, 0.004], [301.0, -398.0, 1203.0])
+    assert [*found.wrenches[GROUND].torque] == pytest.approx(expected.tolist(), rel=1e-13)
 
 
 @pytest.mark.parametrize("law", TORQUES)
@@ -96,6 +107,24 @@ def test_bushing_power_is_balanced(tmp_path, law):
     for way in (solved, traced):
         forces = way(case.mechanism, case).forces
         assert np.abs(forces.power).max() <= 1e-12 * forces.largest_power.max()
+
+
+@pytest.mark.parametrize("law", TORQUES)
+@ENGINES
+def test_bushing_forces_agree_in_all_engines(tmp_path, law, engine):
+    engine, native = installed(engine), installed("native")
+    case = bushed(tmp_path, law)
+    expected, found = (
+        each.solve(each.build(case), case, 1e-12).forces for each in (native, engine)
+    )
+    for name in case.mechanism.drivers:
+        scale = np.abs(expected.drivers[name.name]).max()
+        assert found.drivers[name.name] == pytest.approx(
+            expected.drivers[name.name], abs=1e-11 * scale
+        )
+    for name in ("b", "s"):
+        scale = np.abs(expected.elements[name]).max()
+        assert found.elements[name] == pytest.approx(expected.elements[name], abs=1e-11 * scale)
 
 
 def test_bushing_case_file_round_trip(tmp_path):

@@ -107,6 +107,34 @@ def test_gap_ends_motion(short, count, loops):
     assert f"the limit of travel is turn = {1.0 - end:.6g}"[:-1] in found.message
 
 
+# Each pair of a base, a lack and a start: a Latin square of the 27.
+KITES = [
+    (ground, short, (-0.2, -0.4, -0.7)[(row + column) % 3])
+    for row, ground in enumerate((1.1, 1.4, 2.0))
+    for column, short in enumerate((1e-3, 1e-5, 1e-7))
+]
+
+
+COUNTS = [2, 3, 5, 9, 300]
+
+
+# every kite with two or three of the counts
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize(
+    ("ground", "short", "start", "count"),
+    [(*kite, count) for k, kite in enumerate(KITES) for count in COUNTS[k % 2 :: 2]],
+)
+def test_kite_gap_ends_motion(ground, short, start, count):
+    """A kite that lies on its side: the rod is shorter than the crank, and cannot fold. Beyond,
+    what crosses there is as near.
+    """
+    turn = np.linspace(0.0, -2.0 * start, count)
+    found = solve(loop(start, 1.0 - ground, rod=1.0 - short, rocker=ground), "turn", turn, order=0)
+    # where rod and rocker are in line
+    end = np.arccos((1.0 + ground**2 - (ground - 1.0 + short) ** 2) / (2.0 * ground))
+    assert (found.solved == (turn < -start - end)).all()
+
+
 def test_singular_pose_verdict_ignores_order():
     """The rates interpolated at the pose are worse than the pose; they are not wanted, and what is
     beyond is solved as anywhere.
@@ -240,3 +268,40 @@ def test_nearly_singular_kite_exchanges_rows(ends, beside, style):
     found = solve_all(mechanism, "turn", turn, style=style, order=0)
     expected = corner(start + turn, beside, 1.2, 1.2)
     assert np.abs(found.points["meet"].position - expected).max() <= 1e-13 / abs(beside)
+
+
+# every count with the native style and another one
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize(
+    ("count", "style"),
+    [
+        (count, style)
+        for k, count in enumerate([4, 7, 8, 10, 12, 15])
+        for style in (STYLES[0], STYLES[1 + k % (len(STYLES) - 1)])
+    ],
+)
+def test_small_loop_does_not_hide_corner(count, style):
+    """Its singular values are the smaller ones all the way round, but where the large one folds."""
+    x, y, rest, end = (
+        -0.35245745516404536,
+        -0.7148047631848835,
+        2.802282190370843,
+        (2.175441305403854, 0.49218148289661845),
+    )
+    across = np.cos(1.345), np.sin(1.345), 0.0
+    large = planar_four_bar((x, y, 0.0), (*end, 0.0), (rest, 0.0, 0.0), "universals", across)
+    pin, meet = (
+        (-0.023472379164771337, -0.0056469601124647896, 0.0),
+        (0.0017654205974588259, 0.11112362657419883, 0.0),
+    )
+    joints = [
+        Revolute(
+            "small rest", "ground", "small", (0.12433883023528294, 0.04634680743282863, 0.0), Z
+        ),
+        Distance("small rod", "crank", "small", (pin, meet)),
+    ]
+    both = replace(large, bodies=[*large.bodies, Body("small")], joints=[*large.joints, *joints])
+    turn = np.linspace(0.0, 5.0379839, count)
+    found = solve_all(both, "turn", turn, order=0, style=style)
+    side = side_of_the_line((x, y), rest, turn, found)
+    assert (side * side[0] > 0.0).all()

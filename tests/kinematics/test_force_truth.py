@@ -1,6 +1,7 @@
 """Reactions and efforts against ADAMS, a published benchmark and closed forms."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,16 @@ def test_pendulum_reactions_closed_form():
     assert reaction.force == pytest.approx(expected, abs=1e-13)
     assert reaction.moment == pytest.approx(0.0, abs=1e-13)
     assert found.drivers["turn"] == pytest.approx(9.81 * C, abs=1e-13)
+
+
+def test_reactions_of_reversed_joint_change_sign():
+    """Then the reaction is what the arm exerts on the ground."""
+    one = turned(HEAVY)
+    other = turned(replace(HEAVY, joints=[HEAVY.joints[0].reversed()]), sign=-1.0)
+    assert one.drivers["turn"] == pytest.approx(-other.drivers["turn"], abs=1e-13)
+    one, other = one.joints["hinge"], other.joints["hinge"]
+    assert one.force == pytest.approx(-other.force, abs=1e-13)
+    assert one.moment == pytest.approx(-other.moment, abs=1e-13)
 
 
 def test_pendulum_forces_of_each_element():

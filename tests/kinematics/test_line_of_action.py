@@ -4,12 +4,13 @@ free-body diagrams.
 
 from dataclasses import dataclass, replace
 
+import numpy as np
 import pytest
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.joints import Cylindrical, Planar, Revolute, Screw, Translational
 from kincheck.core.joints.base import AxialJoint, triad
-from kincheck.core.kinematics import NativeSolver, with_forces
+from kincheck.core.kinematics import NativeSolver, styles, with_forces
 
 from ..support.driven_chains import COUPLINGS, SLOW, Link, chain, deviation, pushed_slide
 
@@ -77,6 +78,14 @@ def test_forces_of_pushed_point(kind, flipped):
     assert deviation(made, native(made)) < ROUND_OFF
 
 
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("style", styles())
+@pytest.mark.parametrize("kind", ["translational", "screw, by its slide"])
+def test_line_of_action_in_row_styles(kind, style):
+    made = chain([HINGE, replace(KINDS[kind], flipped=True), HINGE])
+    assert deviation(made, native(made, style)) < ROUND_OFF
+
+
 def test_line_of_action_far_from_origin():
     """Ten kilometres from the global origin: coordinates have lost four digits."""
     made = chain([HINGE, Link(Translational, flipped=True), HINGE], origin=(6e3, -8e3, 1e3))
@@ -97,3 +106,20 @@ def test_forces_of_user_slide(flipped):
 
     made = chain([HINGE, Link(Rail, flipped), HINGE])
     assert deviation(made, native(made)) < ROUND_OFF
+
+
+def test_slide_moment_of_offset_weight():
+    """(com - P) x W at every sample, as by hand on paper."""
+    made = chain([Link(Translational, flipped=True)], slow=SLOW)
+    (body,), (joint,) = made.mechanism.bodies, made.mechanism.joints
+    still = replace(body, center_of_mass=(0.0, 0.0, 0.0), mass=1.0)
+    guide = replace(joint, point=(0.4, -0.2, 0.3), axis=(0.3, 0.5, 1.0))
+    mechanism = replace(made.mechanism, bodies=[still], joints=[guide], gravity=(0.0, 0.0, -10.0))
+    found = native(replace(made, mechanism=mechanism)).joints[joint.name]
+    # of the block on the ground, about a point of the ground that the block passes
+    h = np.array(guide.axis) / np.linalg.norm(guide.axis)
+    shifts = -made.coordinates[joint.name, "translation"].at(made.path.times)[0]
+    for moment, shift in zip(found.moment, shifts, strict=True):
+        weight = np.array([0.0, 0.0, -10.0])
+        about = np.cross(shift * h - np.array(guide.point), weight)
+        assert moment == pytest.approx(about, abs=1e-12)

@@ -17,7 +17,7 @@ from kincheck.core.kinematics.structure.redundancy import independent_rows
 from kincheck.core.primitives.base import Pose
 from kincheck.core.program import Elimination
 
-from ..support.mechanisms import Z
+from ..support.mechanisms import Z, errors, solve_all
 
 
 def test_independent_rows_of_known_matrix():
@@ -26,6 +26,17 @@ def test_independent_rows_of_known_matrix():
     assert len(kept) == np.linalg.matrix_rank(rows) == np.linalg.matrix_rank(rows[kept])
     assert independent_rows(rows, 1)[-1] == 3  # the last row first
     assert independent_rows(np.zeros((2, 3)), 0) == []
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_independent_rows_of_random_matrices(seed):
+    """As many as the rank by singular values, and independent, with the last rows among them."""
+    rng = np.random.default_rng(seed)
+    rank = int(rng.integers(1, 8))
+    matrix = rng.normal(size=(12, rank)) @ rng.normal(size=(rank, 9))
+    kept = independent_rows(matrix, 1)
+    assert len(kept) == rank == np.linalg.matrix_rank(matrix[kept])
+    assert 11 in kept
 
 
 def test_independent_rows_in_portions():
@@ -130,6 +141,16 @@ def rim(turn):
     """Closed form of the rim of the second wheel, its velocity and acceleration."""
     c, s, zero = 0.5 * np.cos(turn), 0.5 * np.sin(turn), 0.0 * turn
     return [np.column_stack(each) for each in ([2.0 + c, s, zero], [-s, c, zero], [-c, -s, zero])]
+
+
+def test_dead_rod_is_no_singular_pose():
+    """The rod whose rows were chosen comes to its dead points; the mechanism is regular there, for
+    the other rod is not.
+    """
+    turn = np.linspace(0.0, 4.0 * np.pi, 49)
+    found = solve_all(locomotive(np.pi / 2.0), "turn", turn)
+    assert errors(found.points["rim"], rim(turn))[0] <= 1e-13
+    assert not {"notes", "singular_poses"} & set(found.details)
 
 
 def test_two_dead_rods_are_singular():

@@ -169,6 +169,36 @@ def test_paper_equations_hold(name, write, style):
         assert np.abs(phi_tt).max() <= 1e-11
 
 
+def test_paper_equations_find_wrong_rates():
+    """The check above has teeth: omega' in the wrong frame or with the wrong sign breaks it by
+    orders of magnitude.
+    """
+    mechanism, found = mcpherson(), solution()
+    r, p, v, a = naive.sample(found, 0)["knuckle"]
+    A = naive.A(p)
+    for part, rates, seconds in (
+        (1, np.r_[v[:3], A @ v[3:]], a),
+        (1, np.r_[v[:3], -v[3:]], a),
+        (2, v, np.r_[a[:3], A @ a[3:]]),
+    ):
+        path = naive.along(naive.sample(found, 0) | {"knuckle": (r, p, rates, seconds)})
+        parts = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
+        assert np.abs(parts[part]).max() > 1e-2
+
+
+def test_points_follow_bodies():
+    """Position, velocity and acceleration of a point by the bodies' r, p, omega' alone."""
+    mechanism, found = mcpherson(), solution()
+    arm = naive.arm(naive.design(mechanism)["knuckle"], mechanism.point("rod_end").position)
+    for k in range(0, 161, 20):
+        r, p, v, a = naive.sample(found, k)["knuckle"]
+        A, w, w_t = naive.A(p), naive.tilde(v[3:]), naive.tilde(a[3:])
+        rod_end = found.points["rod_end"]
+        assert rod_end.position[k] == pytest.approx(r + A @ arm, abs=5e-16)
+        assert rod_end.velocity[k] == pytest.approx(v[:3] + A @ w @ arm, abs=5e-15)
+        assert rod_end.acceleration[k] == pytest.approx(a[:3] + A @ (w_t + w @ w) @ arm, abs=5e-14)
+
+
 # A solution has what is asked for and no more, and bad arguments are refused
 
 
@@ -327,6 +357,26 @@ def test_held_driver_keeps_value():
     wheel = fixed.points["wheel"]
     expected = wheel.position, wheel.velocity, wheel.acceleration
     assert (errors(held.points["wheel"], expected) <= [5e-16, 1e-14, 1e-13]).all()
+
+
+def test_driven_displacement():
+    """Steering with the stroke held: the rack moves as driven, all joints hold, the wheel keeps its
+    height.
+    """
+    mechanism, values = steered(), np.linspace(-0.03, 0.05, 9)
+    bodies = [body.name for body in mechanism.moving]
+    found = solve_all(mechanism, "steer", values, rate=0.2, bodies=bodies)
+    rack = found.bodies["rack"]
+    assert rack.r - (1.14, 0.0, 0.1455) == pytest.approx(
+        np.outer(values, (0.0, 1.0, 0.0)), abs=1e-16
+    )
+    assert rack.v == pytest.approx(np.tile((0.0, 0.2, 0.0, 0.0, 0.0, 0.0), (9, 1)), abs=1e-15)
+    assert np.abs(found.points["wheel"].position[:, 2] - 0.101).max() <= 2e-16
+    for k in range(len(values)):
+        path = naive.along(naive.sample(found, k))
+        parts = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
+        largest = [np.abs(part).max() for part in parts]
+        assert (np.array(largest) < [2e-15, 1e-13, 1e-11]).all()
 
 
 def test_drivers_in_either_order():

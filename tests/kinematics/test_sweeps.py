@@ -9,9 +9,11 @@ import pytest
 from kincheck.core import (
     Body,
     Distance,
+    JointAngle,
     Mechanism,
     Point,
     PointCoordinate,
+    Revolute,
     Spherical,
 )
 from kincheck.core.kinematics import Method, NativeSolver, solve
@@ -24,6 +26,7 @@ from kincheck.core.mechanism.motions import Path, Ramp
 from ..support.mechanisms import (
     CRANK,
     ROD,
+    Y,
     errors,
     four_bar,
     four_bar_motion,
@@ -109,6 +112,14 @@ def test_slider_crank_closed_form(angles, rate):
     assert pin.position[:, 2] == pytest.approx(-CRANK * np.sin(angles), abs=1e-15)
 
 
+def test_whole_turns_return_to_design():
+    found = solve(slider_crank(), "turn", 2.0 * np.pi * np.arange(-20, 21), bodies=["crank"])
+    # the angle itself rounds at 126 rad
+    assert np.abs(found.points["end"].position[:, 0] - (CRANK + ROD)).max() <= 1e-14
+    sign = found.bodies["crank"].p[:, 0]  # Euler parameters know odd from even turns
+    assert sign == pytest.approx((-1.0) ** np.arange(-20, 21), abs=1e-14)
+
+
 def test_four_bar_closed_form():
     found = solve_all(four_bar(), "turn", TURNS)
     expected = along_x(*four_bar_motion(TURNS))
@@ -133,6 +144,41 @@ def test_driven_slider():
     x = design - values
     cosine = (x * x + CRANK**2 - ROD**2) / (2.0 * x * CRANK)
     assert found.points["pin"].position[:, 0] == pytest.approx(CRANK * cosine, abs=1e-15)
+
+
+def test_relative_angle_of_moving_bodies():
+    """Two arms in line: the second driven against the first, which is held."""
+    arms = Mechanism(
+        "arms",
+        [Body("upper"), Body("lower")],
+        [
+            Revolute("shoulder", "ground", "upper", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+            Revolute("elbow", "lower", "upper", (1.0, 0.0, 0.0), (0.0, 0.0, 2.0)),
+        ],
+        [Point("hand", "lower", (2.0, 0.0, 0.0))],
+        [JointAngle(name, name) for name in ("shoulder", "elbow")],
+    )
+    angles = np.linspace(-5.0, 5.0, 21)
+    for driver, expected in (
+        ("shoulder", [2.0 * np.cos(angles), 2.0 * np.sin(angles)]),
+        ("elbow", [1.0 + np.cos(angles), -np.sin(angles)]),  # of the upper relative to the lower
+    ):
+        hand = solve(arms, driver, angles).points["hand"]
+        assert pytest.approx(np.array(expected), abs=2e-15) == hand.position[:, :2].T
+
+
+def test_open_chain():
+    """Three links in line, without a loop: the middle hinge swept, the others held."""
+    links = ["ground", "link 0", "link 1", "link 2"]
+    hinges = [Revolute(f"hinge {k}", *links[k : k + 2], (float(k), 0.0, 0.0), Y) for k in range(3)]
+    drivers = [JointAngle(f"turn {k}", f"hinge {k}") for k in range(3)]
+    tip = Point("tip", "link 2", (3.0, 0.0, 0.0))
+    m = Mechanism("chain", map(Body, links[1:]), hinges, [tip], drivers)
+    angles = np.linspace(-3.0, 3.0, 13)
+    tip = solve(m, "turn 1", angles).points["tip"]
+    assert tip.position[:, 0] == pytest.approx(1.0 + 2.0 * np.cos(angles), abs=2e-15)
+    assert tip.position[:, 2] == pytest.approx(-2.0 * np.sin(angles), abs=2e-15)
+    assert tip.acceleration[:, 0] == pytest.approx(-2.0 * np.cos(angles), abs=5e-15)
 
 
 def test_arm_on_ball_and_rods():
@@ -219,6 +265,14 @@ def test_samples_beyond_dead_centre():
     found = solve(slider_crank(rod=0.1), "turn", turn)
     assert (found.solved == (turn < np.arcsin(0.1 / CRANK))).all()
     assert "cannot be followed" in found.message
+
+
+@pytest.mark.parametrize("samples", [3, 5, 9, 20])
+def test_both_directions_end(samples):
+    """Both fronts divide their steps at once, in one block of lanes."""
+    found = solve(mcpherson(), "stroke", np.linspace(-1.5, 1.5, samples))
+    assert found.message.count("cannot be followed beyond stroke = ") == 2
+    assert not found.solved.all()
 
 
 # Coarse sweeps are gone in parts of their steps: to the samples of a closed form, by whichever

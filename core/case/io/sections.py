@@ -63,7 +63,7 @@ class CaseSection:
         raise NotImplementedError
 
     def with_derived(self, case: Case, table: Any) -> Case:
-        """Return a case with the table with the outputs that follow from its others."""
+        """Return the case, which has the table, with outputs that follow from its others."""
         return case
 
     def convention(self, section: Section) -> str:

@@ -49,6 +49,15 @@ def test_free_pendulum_swings_by_elliptic_functions():
     assert (found.freedoms, found.redundant) == (1, 0)
 
 
+def test_pendulum_tension_follows_from_its_speed():
+    t = np.linspace(0.0, 1.0, 5)
+    found = free_motion(pendulum(), t)
+    angle, force = swing(t, 0.7, 1.2), found.forces(["hinge"]).joints["hinge"].force[found.samples]
+    along = np.stack([0.0 * t, -np.sin(angle), np.cos(angle)], axis=1)
+    tension = 2.0 * (3.0 * G * np.cos(angle) - 2.0 * G * math.cos(1.2))
+    assert (force * along).sum(axis=1) == pytest.approx(tension, abs=1e-10)
+
+
 def test_reactions_with_redundant_rows_obey_newton():
     linkage = kincheck.load("four_bar").mechanism
     coupler = linkage.body("coupler")

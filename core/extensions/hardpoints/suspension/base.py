@@ -37,7 +37,7 @@ class _ByFormula(PoseQuantity):
 
 @lru_cache(KEPT)
 def _points_of(output: PoseQuantity) -> tuple[str, ...]:
-    """Return the names of the points that a formula reads: of none is anything known here."""
+    """Return the names of the points that a formula reads when it runs on unknown places."""
     read = defaultdict[str, Vec3](lambda: Vec3(UNKNOWN, UNKNOWN, UNKNOWN))
     output.of(read, read)
     return tuple(read)
@@ -99,8 +99,9 @@ class SuspensionOutput(_ByFormula, TypedQuantity):
         """Convention of signs and axes, in words."""
         return self.vehicle.signs
 
+    # with both lists of arguments, a type checker accepts formulas of one corner and of two
     @abstractmethod
-    def value(self, *corners: Any, **none: Any) -> Jet:
+    def value(self, *corners: Any, **named: Any) -> Jet:
         """Return the value of the formula, of the corner of each wheel."""
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
