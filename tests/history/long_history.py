@@ -21,8 +21,8 @@ from ..support.history_runs import FACTS
 
 CASES = ["five_bar", "rssr", "mcpherson_strut"]
 ENGINES = {"native": "0.3.0", "mujoco": "4.0.0", "pinocchio": "4.1.0"}
-SECONDS, MEGABYTES = 1.0, 150
-"""What a report, and a list of the runs, may take: of a processor, and of memory."""
+MEGABYTES = 150
+"""What a report, and a list of the runs, may take of memory."""
 
 
 def make(path, runs):
@@ -85,18 +85,34 @@ def _tables(connection):
         yield table, [name for _, name, *_ in rows]
 
 
+COUNTED = """
+import contextlib, io, json, resource, sys
+from kincheck.core.cli.main import main
+
+calls, said = 0, io.StringIO()
+
+def count(frame, event, argument):
+    global calls
+    calls += event in ("call", "c_call")
+
+with contextlib.redirect_stdout(io.StringIO()):
+    main(sys.argv[1:])  # what is imported, and what stays in memory
+with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+    sys.setprofile(count)
+    status = main(sys.argv[1:])
+    sys.setprofile(None)
+memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(json.dumps([status, calls, memory / 1024, said.getvalue()]))
+"""
+
+
 def cost(*words):
-    """Status, processor time [s], memory [MB] and output of a command."""
-    script = (
-        "import resource, subprocess, sys\n"
-        "done = subprocess.run(sys.argv[1:], capture_output=True, text=True)\n"
-        "used = resource.getrusage(resource.RUSAGE_CHILDREN)\n"
-        "import json\n"
-        "print(json.dumps([done.returncode, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024,"
-        " done.stdout + done.stderr]))\n"
-    )
-    command = [sys.executable, "-m", "kincheck", *map(str, words)]
-    return json.loads(subprocess.check_output([sys.executable, "-c", script, *command], text=True))
+    """Status, calls of functions, memory [MB] and output of a command.
+
+    Calls are counted, since the time of a processor is another one on each machine.
+    """
+    command = [sys.executable, "-c", COUNTED, *map(str, words)]
+    return json.loads(subprocess.check_output(command, text=True))
 
 
 if __name__ == "__main__":
@@ -106,6 +122,6 @@ if __name__ == "__main__":
     print(f"{file.stat().st_size / 1e6:.0f} MB")
     for words in (("report",), ("history",), ("history", "--case", "rssr"), ("--version",)):
         history = () if words == ("--version",) else ("--history", file)
-        status, seconds, megabytes, said = cost(*words, *history)
-        print(f"{' '.join(words)}: status {status}, {seconds:.2f} s, {megabytes:.0f} MB")
+        status, calls, megabytes, said = cost(*words, *history)
+        print(f"{' '.join(words)}: status {status}, {calls} calls, {megabytes:.0f} MB")
         print(said[:300])
