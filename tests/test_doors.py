@@ -3,9 +3,11 @@
 import sys
 from importlib.metadata import EntryPoint
 
+import kincheck
 import pytest
 from kincheck.core import KincheckError, doors
 from kincheck.core.cli.main import every_command, main
+from kincheck.core.kinematics import NativeSolver
 
 from .docs.page import blocks
 from .support.sources import EXTENSIONS, ROOT
@@ -42,6 +44,33 @@ def installed(fresh, tmp_path, monkeypatch):
 def test_extension_of_page_adds_command(installed, capsys):
     assert main(["bodies", "rssr"]) == 0
     assert capsys.readouterr().out == "crank moves\nrocker moves\n"
+
+
+def test_public_command_without_answer_is_named(installed, monkeypatch):
+    extension = doors.extensions()["bodies"]
+    monkeypatch.setitem(extension.offers, "public", {"bodies": "command:ListBodies"})
+    with pytest.raises(TypeError, match=r"kincheck\.bodies: ListBodies has no method answer"):
+        getattr(kincheck, "bodies")  # noqa: B009  unknown to those who read types
+
+
+def test_method_of_extension_by_name(fresh, monkeypatch):
+    extension = doors.Extension("x.mine", methods={"by hand": "mine:by_hand"})
+    monkeypatch.setattr(doors, "_of_folders", lambda: [extension])
+    monkeypatch.setattr(doors, "entry_points", lambda group: {})
+    made = []
+
+    def by_hand(mechanism, request):
+        made.append(mechanism)
+        return lambda path: lambda tolerance: "solved"
+
+    monkeypatch.setattr(doors.Offer, "load", lambda self: by_hand)
+    case = kincheck.load("four_bar")
+    solve = NativeSolver(method="by hand").prepare(case.mechanism, case.sweep.path)
+    assert (made, solve(1e-12)) == ([case.mechanism], "solved")
+    with pytest.raises(
+        KincheckError, match=r"method 'other'\. Leave it out, or give one of by hand"
+    ):
+        NativeSolver(method="other").prepare(case.mechanism, case.sweep.path)
 
 
 def test_every_folder_is_an_extension():

@@ -17,10 +17,16 @@ run = function("run", Run)
 
 
 def offered(name: str) -> Any:
-    """Return what an extension offers under a name; of a command, its function."""
+    """Return what an extension offers under a name; of a command, its function.
+
+    Raises:
+        TypeError: the command has no answer.
+    """
     found: Any = offers("public")[name].load()
     kind: object = found
     if isinstance(kind, type) and issubclass(kind, Command):
+        if not hasattr(kind, "answer"):
+            raise TypeError(f"kincheck.{name}: {found.__name__} has no method answer(registry)")
         found = function(name, found)
     return found
 

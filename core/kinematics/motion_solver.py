@@ -39,9 +39,9 @@ class Method(StrEnum):
     SPARSE = "one sparse system"
 
 
-def by_method(method: Method) -> Callable[[Mechanism, Request], Callable[[Path], Solver]] | None:
+def by_method(method: str) -> Callable[[Mechanism, Request], Callable[[Path], Solver]] | None:
     """Return the preparation of large mechanisms for paths; None without its extension."""
-    offer = offers("methods").get(method.value)
+    offer = offers("methods").get(method)
     return offer and offer.load()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from ..doors import offers
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
@@ -28,15 +29,15 @@ class NativeSolver:
             same to round-off.
         last_iteration: a sample's iteration from a residual below this is its last [units of the
             mechanism's size]; a sparse system iterates as long as it gains by it.
-        method: the system solved at once. `BY_SIZE` keeps the last few mechanisms ready in the
-            process; the others make them ready anew.
+        method: the system solved at once, a `Method` or the name of an extension's. `BY_SIZE`
+            keeps the last few mechanisms ready in the process; the others make them ready anew.
     """
 
     order: int = 2
     style: str = NATIVE
     compiled: bool = True
     last_iteration: float = LAST_ITERATION
-    method: Method = Method.BY_SIZE
+    method: str = Method.BY_SIZE
 
     def prepare(
         self,
@@ -60,15 +61,16 @@ class NativeSolver:
                 at the design position.
         """
         request = self.request(mechanism, path, points, bodies, forces)
-        if self.method is Method.BY_SIZE:
+        if self.method == Method.BY_SIZE:
             return prepare(mechanism, request, path)
-        if self.method is Method.ONE_PROGRAM:
+        if self.method == Method.ONE_PROGRAM:
             return by_program(
                 mechanism, request, path, lambda each: Route(compile_model(mechanism, each), path)
             )
         if (make := by_method(self.method)) is None:
             raise SolveError(
-                f"no extension solves {self.method.value}. Leave out the method, or install blocks."
+                f"no extension has the method '{self.method}'. Leave it out, or give one of"
+                f" {', '.join(sorted(offers('methods')))}."
             )
         motion = make(mechanism, motion_only(mechanism, request))(path)
         return by_motion(mechanism, request, path, motion)
