@@ -26,7 +26,19 @@ def fresh():
 
 
 @pytest.fixture
-def installed(fresh, tmp_path, monkeypatch):
+def found(fresh, monkeypatch):
+    """Call to have these extensions of folders, and others installed."""
+
+    def only(*of_folders, **installed):
+        points = {name: EntryPoint(name, value, doors.GROUP) for name, value in installed.items()}
+        monkeypatch.setattr(doors, "_of_folders", lambda: of_folders)
+        monkeypatch.setattr(doors, "entry_points", lambda group: points)
+
+    return only
+
+
+@pytest.fixture
+def installed(found, tmp_path, monkeypatch):
     """The package of the page, as its pyproject.toml installs it."""
     for block in blocks(PAGE.read_text(encoding="utf-8")):
         if block.title:
@@ -34,8 +46,7 @@ def installed(fresh, tmp_path, monkeypatch):
             file.parent.mkdir(exist_ok=True)
             file.write_text(block.text, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    point = EntryPoint("bodies", "kincheck_bodies:EXTENSION", doors.GROUP)
-    monkeypatch.setattr(doors, "entry_points", lambda group: {point.name: point})
+    found(bodies="kincheck_bodies:EXTENSION")
     yield
     for name in [name for name in sys.modules if name.startswith("kincheck_bodies")]:
         del sys.modules[name]
@@ -53,10 +64,8 @@ def test_public_command_without_answer_is_named(installed, monkeypatch):
         getattr(kincheck, "bodies")  # noqa: B009  unknown to those who read types
 
 
-def test_method_of_extension_by_name(fresh, monkeypatch):
-    extension = doors.Extension("x.mine", methods={"by hand": "mine:by_hand"})
-    monkeypatch.setattr(doors, "_of_folders", lambda: [extension])
-    monkeypatch.setattr(doors, "entry_points", lambda group: {})
+def test_method_of_extension_by_name(found, monkeypatch):
+    found(doors.Extension("x.mine", methods={"by hand": "mine:by_hand"}))
     made = []
 
     def by_hand(mechanism, request):
@@ -84,26 +93,20 @@ def test_every_offer_can_be_loaded():
     assert all(each.load() is not None for kind in offered.values() for each in kind.values())
 
 
-def test_extension_without_its_needs_is_absent(fresh, monkeypatch):
+def test_extension_without_its_needs_is_absent(found):
     """Also one that needs it over another."""
     chain = [("a", ["gone"]), ("b", ["a"]), ("c", [])]
-    found = [doors.Extension(f"x.{name}", needs=needs) for name, needs in chain]
-    monkeypatch.setattr(doors, "_of_folders", lambda: found)
-    monkeypatch.setattr(doors, "entry_points", lambda group: {})
+    found(*(doors.Extension(f"x.{name}", needs=needs) for name, needs in chain))
     assert [*doors.extensions()] == ["c"]
 
 
-def test_two_extensions_of_one_name(fresh, monkeypatch):
-    monkeypatch.setattr(doors, "_of_folders", lambda: [doors.Extension("x.a")])
-    point = EntryPoint("a", "x:EXTENSION", doors.GROUP)
-    monkeypatch.setattr(doors, "entry_points", lambda group: {point.name: point})
+def test_two_extensions_of_one_name(found):
+    found(doors.Extension("x.a"), a="x:EXTENSION")
     with pytest.raises(KincheckError, match=r"Two extensions are named 'a'\. Rename"):
         doors.extensions()
 
 
-def test_two_offers_of_one_name(fresh, monkeypatch):
-    found = [doors.Extension(f"x.{name}", commands={"move": "a:A"}) for name in "ab"]
-    monkeypatch.setattr(doors, "_of_folders", lambda: found)
-    monkeypatch.setattr(doors, "entry_points", lambda group: {})
+def test_two_offers_of_one_name(found):
+    found(*(doors.Extension(f"x.{name}", commands={"move": "a:A"}) for name in "ab"))
     with pytest.raises(KincheckError, match="a and b both offer 'move' under commands"):
         doors.offers("commands")

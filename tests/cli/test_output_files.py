@@ -101,25 +101,34 @@ sys.exit(main())
 """
 
 
+@pytest.fixture
+def stopped_sweep(here):
+    """Call to sweep by a program that does not end its store; the earlier one is kept."""
+    pytest.importorskip("pyarrow.parquet")
+
+    def sweep(program, samples):
+        Path("all.parquet").write_bytes(b"an earlier study")
+        # without bytecode, whose files a limit would cut
+        command = [sys.executable, "-B", "-c", program, *SWEEP[:-1], samples]
+        ran = subprocess.run(
+            [*command, "--store", "all.parquet"], capture_output=True, text=True, check=False
+        )
+        assert Path("all.parquet").read_bytes() == b"an earlier study"
+        return ran
+
+    return sweep
+
+
 @pytest.mark.needs("sweep")
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes")
-def test_full_disk_keeps_previous_store(here):
-    pytest.importorskip("pyarrow.parquet")
-    Path("all.parquet").write_bytes(b"an earlier study")
-    ran = subprocess.run(
-        # without bytecode, whose files the limit would cut
-        [sys.executable, "-B", "-c", LIMITED, *SWEEP[:-1], "400", "--store", "all.parquet"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def test_full_disk_keeps_previous_store(here, stopped_sweep):
+    ran = stopped_sweep(LIMITED, "400")
     assert ran.returncode == 2
     assert "400 variants of mcpherson_strut, all solved" in ran.stdout
     assert ran.stderr.splitlines()[-1].startswith(
         "kincheck: --store all.parquet: cannot be written"
     )
     assert "Traceback" not in ran.stderr
-    assert Path("all.parquet").read_bytes() == b"an earlier study"
     assert not [*here.glob("*.part")]
 
 
@@ -143,16 +152,8 @@ sys.exit(main())
 
 @pytest.mark.needs("sweep")
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
-def test_killed_sweep_keeps_previous_store(here):
-    pytest.importorskip("pyarrow.parquet")
-    Path("all.parquet").write_bytes(b"an earlier study")
-    ran = subprocess.run(
-        [sys.executable, "-c", KILLED, *SWEEP, "--store", "all.parquet"],
-        capture_output=True,
-        check=False,
-    )
-    assert ran.returncode == -9
-    assert Path("all.parquet").read_bytes() == b"an earlier study"
+def test_killed_sweep_keeps_previous_store(stopped_sweep):
+    assert stopped_sweep(KILLED, SWEEP[-1]).returncode == -9
 
 
 @pytest.mark.needs("explain", "trees")
