@@ -7,13 +7,28 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import solve
-from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck import (
+    Body,
+    Case,
+    Cylindrical,
+    Gear,
+    JointAngle,
+    JointDisplacement,
+    Mechanism,
+    Point,
+    Ramp,
+    Revolute,
+    Sine,
+    Spherical,
+    Translational,
+    Universal,
+    solve,
+)
+from kincheck.core.case.case import Sweep, Truth
 from kincheck.core.case.measures import Component, Orientation
 from kincheck.core.case.measures import JointAngle as Angle
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.compare import output_series
-from kincheck.core.joints import Cylindrical, Gear, Revolute, Spherical, Translational, Universal
 from kincheck.core.kinematics import (
     NativeSolver,
     angle_with_turns,
@@ -23,18 +38,16 @@ from kincheck.core.kinematics import (
     in_doubt,
     near_design,
 )
-from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.one_design import prepare as prepare_one
 from kincheck.core.mechanism.loads import TorsionSpringDamper
-from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
-from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Path, Ramp, Sine
+from kincheck.core.mechanism.motions import Path
 
 from ..support.mechanisms import X, Z
 
 BEND = 0.8  # cosine of the angle between the shafts
 
 
-def shafts() -> Mechanism:
+def shafts():
     """Hooke's joint between two shafts, with a torsional spring on the driven one."""
     return Mechanism(
         "shafts",
@@ -57,14 +70,14 @@ def driven(x):
     return x + np.arctan2(less, np.cos(x) ** 2 + BEND * np.sin(x) ** 2)
 
 
-def series(case: Case, order: int = 2):
+def series(case, order=2):
     """Values of the outputs of a case, shape (outputs, n)."""
     solver = NativeSolver(order=order)
     motion = solver.prepare(case.mechanism, case.sweep.path, list(case.points))(1e-12)
     return np.array([output_series(case, output, motion).position for output in case.outputs])
 
 
-def angles(sweep: Sweep, joint: str):
+def angles(sweep, joint):
     output = Angle("angle", 1e-9, 0.0, "test", joint)
     mechanism = with_markers(shafts(), [output])
     return series(Case("shafts", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, (output,)))[0]
@@ -72,12 +85,7 @@ def angles(sweep: Sweep, joint: str):
 
 @pytest.mark.parametrize(
     "values",
-    [
-        [0.0, 6 * math.pi],
-        np.linspace(-10 * math.pi, 50 * math.pi, 7),
-        [101.0, 60.0, -40.0],
-        [60.0],
-    ],
+    [[0.0, 6 * math.pi], np.linspace(-10 * math.pi, 50 * math.pi, 7), [101.0, 60.0, -40.0], [60.0]],
     ids=str,
 )
 def test_angle_turns_between_distant_samples(values):
@@ -85,11 +93,7 @@ def test_angle_turns_between_distant_samples(values):
     assert turned == pytest.approx(driven(values), abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "motion",
-    [Sine(10.0, 1.0, math.pi / 2), Sine(-40.0, 0.3, 0.5)],
-    ids=str,
-)
+@pytest.mark.parametrize("motion", [Sine(10.0, 1.0, math.pi / 2), Sine(-40.0, 0.3, 0.5)], ids=str)
 def test_angle_turns_from_offset_start(motion):
     times = np.array([0.0, 0.1, 0.2])
     values = motion.at(times)[0]
@@ -145,7 +149,7 @@ def test_angle_at_fold_adds_no_turn():
 def test_angles_share_one_followed_motion(monkeypatch):
     asked: list[int] = []
 
-    def prepare(mechanism: Mechanism, request: Request, path: Path):
+    def prepare(mechanism, request, path):
         asked.append(len(request.bodies))
         return prepare_one(mechanism, request, path)
 
@@ -179,11 +183,11 @@ MECHANISM = with_markers(
 )
 
 
-def case(sweep: Sweep) -> Case:
+def case(sweep):
     return Case("tumbler", "test", Truth.CONSENSUS_ONLY, MECHANISM, sweep, tuple(OUTPUTS))
 
 
-def swept(values) -> Case:
+def swept(values):
     return case(Sweep("turn", np.array(values, dtype=float), motions={"bend": Ramp(RATIO)}))
 
 

@@ -6,8 +6,9 @@ import math
 import re
 
 import pytest
+from kincheck import Outcome, Results
 from kincheck.core.harness.labels import number
-from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
+from kincheck.core.harness.record import Deviation, Deviations
 from kincheck.core.report.axis import SAMPLES
 from kincheck.core.report.figures import SYMBOLS, Past
 from kincheck.core.report.report import write_report
@@ -120,10 +121,7 @@ def test_figures_without_reference_show_differences(tmp_path):
         name: judged(one.outputs[name], native.outputs[name], 1e-9, "native")
         for name in one.outputs
     }
-    page = report(
-        Results(run=run.run, records=[native, replace(one, errors=output)]),
-        tmp_path,
-    )
+    page = report(Results(run=run.run, records=[native, replace(one, errors=output)]), tmp_path)
     assert traces(page, "case-0-0", "reference", "lines") == []
     assert traces(page, "case-0-0-position", "native", "lines+markers") == []
     [curve] = traces(page, "case-0-0-position", "one", "lines+markers")

@@ -197,10 +197,7 @@ def test_drivers_move_to_own_values(name, tmp_path):
 
 
 @node
-@pytest.mark.parametrize(
-    "name",
-    ["four_bar", pytest.param("mcpherson_suspension", marks=pytest.mark.needs("hardpoints"))],
-)
+@pytest.mark.parametrize("name", ["four_bar", "mcpherson_suspension"])
 def test_javascript_of_case_equals_native(name, tmp_path):
     case = kincheck.load(name)
     write(tmp_path, js.files(case, ()))
