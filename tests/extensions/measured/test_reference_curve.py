@@ -10,12 +10,12 @@ import kincheck.adapters
 import kincheck.core
 import numpy as np
 import pytest
+from kincheck import Outcome
 from kincheck.adapters.native import Native
 from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
-from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
 from ...support.case_texts import refused, write
@@ -152,11 +152,7 @@ FAULTS = {
     "no unit": ({"head": "travel,toe,camber"}, {}, "43.7 ... without a unit ... travel [mm]"),
     "no output": ({"head": "travel [mm],a,b"}, {}, "'a', 'b' ... --map"),
     "two toes": ({"head": "travel [mm],toe_left,toe angle"}, {}, "'toe_left' and 'toe angle'"),
-    "other signs": (
-        {"head": "# signs: sae_j670\ntravel [mm],toe,camber"},
-        {},
-        "--map ... -OUTPUT",
-    ),
+    "other signs": ({"head": "# signs: sae_j670\ntravel [mm],toe,camber"}, {}, "--map ... -OUTPUT"),
     "contradicting signs": (
         {"head": "# signs: iso8855\ntravel [mm],toe,camber"},
         {"signs": "sae_j670"},
