@@ -161,6 +161,16 @@ def test_zero_errors_have_floor(tmp_path):
     assert figure["layout"]["yaxis"]["ticktext"][0] == "exactly 0"
 
 
+@pytest.mark.parametrize(("tolerance", "floor"), [(2e-3, 1e-10), (0.0, 1e-16)])
+def test_exact_agreement_has_floor(tolerance, floor, tmp_path):
+    run = results()
+    found = series(GRID)
+    errors = {"half_track_change": judged(found, found, tolerance, "closed_form")}
+    exact = replace(run.records[0], outputs={"half_track_change": found}, errors=errors)
+    figure = report(replace(run, records=[exact]), tmp_path).data["figures"]["case-0-0-position"]
+    assert figure["layout"]["meta"]["floor"] == pytest.approx(floor, abs=0.0)
+
+
 def test_long_series_are_thinned(tmp_path):
     driver = [1e-4 * k for k in range(3 * SAMPLES)]
     spike = 1234
