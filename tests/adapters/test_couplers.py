@@ -5,17 +5,18 @@ from dataclasses import replace
 import kincheck
 import numpy as np
 import pytest
-from kincheck.core.case.io.case_file import case_text, load_case
-from kincheck.core.errors import MechanismError
-from kincheck.core.joints import (
+from kincheck import (
     Cylindrical,
     Gear,
+    JointAngle,
+    JointDisplacement,
     LinearCoupler,
+    MechanismError,
     RackPinion,
     Revolute,
     Translational,
 )
-from kincheck.core.mechanism.motions import JointAngle, JointDisplacement
+from kincheck.core.case.io.case_file import case_text, load_case
 
 from ..support.engine_motion import (
     IN_TREE_OR_CUT,

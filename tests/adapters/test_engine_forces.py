@@ -6,20 +6,21 @@ from itertools import product
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core.case.case import TIME, Sweep
-from kincheck.core.joints import (
+from kincheck import (
+    GROUND,
+    Body,
     Cylindrical,
     Gear,
+    JointAngle,
+    Mechanism,
     Planar,
     Polynomial,
     Revolute,
     Screw,
     Translational,
+    cases,
 )
-from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.mechanism import GROUND, Mechanism
-from kincheck.core.mechanism.motions import JointAngle
+from kincheck.core.case.case import TIME, Sweep
 
 from ..support.driven_chains import (
     COUPLINGS,

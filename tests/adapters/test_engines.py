@@ -10,13 +10,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
+from kincheck import Outcome, Revolute, adapters, cases
 from kincheck.core.case.case import Sweep
-from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
 from kincheck.core.harness.workers.pool import in_workers
-from kincheck.core.joints import Revolute
 from kincheck.core.mechanism.motions import Driver
 
 from ..support.aborting_engine import GivingUp
@@ -37,7 +35,7 @@ def strut(values=(), rate=1.0):
 
 
 @ENGINES
-def test_strut_solved_to_round_off(engine: str) -> None:
+def test_strut_solved_to_round_off(engine):
     record = record_of(installed(engine), strut())
     assert record.outcome is Outcome.PASS, record.message
     for errors in record.errors.values():

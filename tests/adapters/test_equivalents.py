@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from kincheck import adapters
+from kincheck import Body, Joint, JointAngle, Planar, Revolute, Translational, adapters
 from kincheck.cases.jet import cos, sin, sqrt, steady
-from kincheck.core import Body, Joint, JointAngle, Revolute, Translational
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, cross, vec
 from kincheck.core.doors import offers
-from kincheck.core.joints import Planar
 from kincheck.core.joints.base import directions, position, triad, unit
 from kincheck.core.mechanism.mechanism import with_equivalents
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
+from kincheck import Distance, PointCoordinate, Spherical, Translational
 from kincheck.adapters.exudyn.exudyn import Exudyn
-from kincheck.core.joints import Distance, Spherical, Translational
-from kincheck.core.mechanism.motions import PointCoordinate
 
 from ..support.engine_motion import TOL, mechanism_of, motion_case, solved
 from ..support.mechanisms import ORIGIN, X

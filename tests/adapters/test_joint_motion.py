@@ -7,16 +7,19 @@ from itertools import product
 
 import numpy as np
 import pytest
-from kincheck.core.joints import (
+from kincheck import (
     Cylindrical,
     Distance,
     Fixed,
+    JointAngle,
+    JointDisplacement,
+    PointCoordinate,
     Revolute,
     Screw,
+    Sine,
     Spherical,
     Universal,
 )
-from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
 
 from ..support.engine_motion import (
     BOTH_ORDERS,
@@ -33,14 +36,7 @@ from ..support.engine_motion import (
     tolerances,
     way_by_day,
 )
-from ..support.joint_loops import (
-    RATE,
-    TOO_LOOSE,
-    TURN,
-    TYPES,
-    assert_moves_natively,
-    on_crank,
-)
+from ..support.joint_loops import RATE, TOO_LOOSE, TURN, TYPES, assert_moves_natively, on_crank
 from ..support.mechanisms import ORIGIN, X
 
 TURNS = np.linspace(-7.0, 7.0, 29)
@@ -167,10 +163,7 @@ def test_second_joint_between_same_bodies(second, engine):
     glued = [pivot, Fixed("glue", "a", "b", (0.1, 0.0, 0.0)), second("again", "a", "b", *how)]
     tip, turn = (0.5, 0.2, 0.1), np.linspace(-1.0, 2.0, 7)
     hinged = [pivot, second("again", "ground", "a", *how)]
-    for joints, body in (
-        (glued, "b"),
-        *([] if second in (Distance, Fixed) else [(hinged, "a")]),
-    ):
+    for joints, body in ((glued, "b"), *([] if second in (Distance, Fixed) else [(hinged, "a")])):
         mechanism = mechanism_of(joints, {"tip": (body, tip)}, [JointAngle("turn", "pivot")])
         found = assert_as_native(engine, mechanism, turn)
         assert_motion(found.points["tip"], rotation(z, turn) @ tip)

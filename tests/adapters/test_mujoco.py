@@ -4,10 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck import (
+    Body,
+    Distance,
+    Fixed,
+    Inline,
+    JointDisplacement,
+    PointCoordinate,
+    Screw,
+    Spherical,
+    Translational,
+)
 from kincheck.adapters.mujoco import mujoco as adapter
-from kincheck.core.joints import Distance, Fixed, Inline, Screw, Spherical, Translational
-from kincheck.core.mechanism.mechanism import Body
-from kincheck.core.mechanism.motions import JointDisplacement, PointCoordinate
 
 from ..support.engine_motion import (
     B0,

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck import JointAngle, RackPinion, Revolute, Screw, SolveError, Translational
 from kincheck.adapters.shared.equivalents import in_own_frame, own_frame
 from kincheck.adapters.shared.projection import Walk
-from kincheck.core import JointAngle, RackPinion, Revolute, Screw, Translational
-from kincheck.core.errors import SolveError
 from kincheck.core.joints import Kind
 
 from ..support.engine_motion import installed, mechanism_of, motion_case

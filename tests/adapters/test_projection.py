@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck import JointAngle, Revolute, Sine, SolveError
 from kincheck.adapters.shared.projection import solve_by_projection
-from kincheck.core import JointAngle, Revolute, SolveError
 from kincheck.core.case.case import Sweep
-from kincheck.core.mechanism.motions import Sine
 
 from ..support.engine_motion import installed, mechanism_of, motion_case
 from ..support.mechanisms import ORIGIN, X, Z

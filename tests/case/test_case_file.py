@@ -7,22 +7,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.adapters.native import Native
-from kincheck.core.case.case import Truth
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.outputs import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
-from kincheck.core.case.quantity import Output
-from kincheck.core.joints import (
+from kincheck import (
     Distance,
     Gear,
     Joint,
     OrientationLock,
     RackPinion,
+    Ramp,
     Screw,
+    Sine,
     Spherical,
+    Table,
 )
+from kincheck.adapters.native import Native
+from kincheck.core.case.case import Truth
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.outputs import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
+from kincheck.core.case.quantity import Output
 from kincheck.core.joints.base import length, position
-from kincheck.core.mechanism.motions import Absolute, Ramp, Sine, Table
+from kincheck.core.mechanism.motions import Absolute
 
 from ..support.case_texts import BASE, INLINE, edited, write
 

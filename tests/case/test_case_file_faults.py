@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from kincheck import CaseError
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.errors import CaseError
 
 from ..support.case_texts import BASE, BY_FILE, INLINE, complains, edited, rows, write
 
@@ -168,10 +168,7 @@ def test_unreadable_case_file_is_refused(tmp_path):
         ("[1, 2]", "found [1, 2] ... expected the keys of a case"),
         ("{", "not valid JSON"),
         ('{"name": "a", "name": "b"}', "not valid JSON ... 'name' is given twice"),
-        (
-            '{"schema": "kincheck-case/1", "name": "a", "source": "\\ud800"}',
-            "source ... printable",
-        ),
+        ('{"schema": "kincheck-case/1", "name": "a", "source": "\\ud800"}', "source ... printable"),
         ('{"schema": NaN}', "schema ... nan"),
     ],
 )

@@ -3,8 +3,8 @@
 import re
 
 import pytest
+from kincheck import CaseError
 from kincheck.core.case.models.files import load
-from kincheck.core.errors import CaseError
 
 from ..support.case_texts import BASE, INLINE, write
 

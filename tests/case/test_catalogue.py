@@ -9,6 +9,7 @@ from pathlib import Path
 import kincheck.cases
 import msgspec
 import pytest
+from kincheck import CaseError, Joint, MechanismError, Spherical
 from kincheck.core.case.io import schema
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.catalogue import case_schema, catalogue, rows_of
@@ -16,9 +17,8 @@ from kincheck.core.case.io.mechanism_sections import DRIVERS
 from kincheck.core.case.io.schema import keys_of
 from kincheck.core.cli import main
 from kincheck.core.cli.lists import SCHEMAS, schema_of
-from kincheck.core.errors import CaseError, MechanismError
 from kincheck.core.harness.record import to_json
-from kincheck.core.joints import Coupler, Joint, Spherical
+from kincheck.core.joints import Coupler
 from kincheck.core.joints.base import directions, position
 from kincheck.core.mechanism.loads import ELEMENTS
 from kincheck.core.mechanism.motions import Motion

@@ -12,10 +12,11 @@ from xml.etree import ElementTree
 
 import msgspec
 import pytest
+from kincheck import Outcome, Results
 from kincheck.core.case.io.document import fault
 from kincheck.core.case.io.escape import cell, file_name, visible
 from kincheck.core.case.io.table_file import Kind, write_csv
-from kincheck.core.harness.record import Outcome, Results, to_json
+from kincheck.core.harness.record import to_json
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.page_model import Material
 from kincheck.core.report.progress import complain, progress

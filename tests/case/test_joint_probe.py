@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from kincheck.core import Distance, MechanismError, Universal, solve
+from kincheck import Distance, Joint, MechanismError, Universal, solve
 from kincheck.core.case.case import Truth
 from kincheck.core.case.joint_probe import AXIS, PAIRS, POINT, TURN, probe, probes, specimen
 from kincheck.core.harness.compare import output_series
-from kincheck.core.joints import Coupler, Joint
+from kincheck.core.joints import Coupler
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.dense_equations import system_of
 from kincheck.core.kinematics.compiled.request import Request

@@ -7,10 +7,10 @@ import re
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from kincheck import CaseError
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.document import Section, fault, parse_json
 from kincheck.core.case.io.lines import join, keys_of, line_of
-from kincheck.core.errors import CaseError
 
 from ..support.case_texts import edited, line_with, write
 from ..support.sources import ROOT

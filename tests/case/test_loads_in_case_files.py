@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from kincheck import adapters
-from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck import Body, Case, adapters
+from kincheck.core.case.case import Sweep, Truth
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.harness.run import run
-from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 
 from ..support.case_texts import complains, edited, rows, write

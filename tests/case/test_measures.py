@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck import Point, Ramp, Sine
 from kincheck.adapters.native import Native
 from kincheck.core.case.case import Sweep
 from kincheck.core.case.io.case_file import load_case
@@ -19,8 +20,6 @@ from kincheck.core.case.measures import (
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.run import run
-from kincheck.core.mechanism.mechanism import Point
-from kincheck.core.mechanism.motions import Ramp, Sine
 from scipy.spatial.transform import Rotation
 
 from ..support.case_texts import BASE, complains, edited, write

@@ -6,13 +6,11 @@ import re
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from kincheck import CaseError, Distance, MechanismError, Supplied
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.notes import notes
 from kincheck.core.case.units import ANGLES, LENGTHS, plain
-from kincheck.core.errors import CaseError, MechanismError
-from kincheck.core.joints import Distance
 
 from ..support.case_texts import write
 

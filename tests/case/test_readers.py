@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import pytest
+from kincheck import CaseError, KincheckError
 from kincheck.core.case.io import reader_options, readers
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.readers import Reader, ReaderOptions
-from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.options import option
 
 

@@ -5,9 +5,9 @@ import zipfile
 from collections import Counter
 
 import pytest
+from kincheck import Supplied
 from kincheck.core.case.io import table
 from kincheck.core.case.io.foreign import MOST_MEMBERS
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_samples import read_table, samples_of
 
 from ..support.case_texts import complains, refused, write
@@ -25,10 +25,7 @@ def book(folder, part, content, more=0):
     made.active.append(["name", "x"])
     made.save(plain := io.BytesIO())
     file = folder / "table.xlsx"
-    with (
-        zipfile.ZipFile(plain) as old,
-        zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as new,
-    ):
+    with zipfile.ZipFile(plain) as old, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as new:
         for each in old.infolist():
             new.writestr(each.filename, content if each.filename == part else old.read(each))
         for k in range(more):
@@ -51,11 +48,7 @@ TOO_MUCH = {
         b"<styleSheet>" + b"<xf/>" * table.MOST_TAGS_ELSEWHERE + b"</styleSheet>",
         f"tags in {STYLES}, expected {table.MOST_TAGS_ELSEWHERE} at most",
     ),
-    "a bomb": (
-        STYLES,
-        bytes(table.MOST_BYTES),
-        f"expected {table.MOST_BYTES} at most",
-    ),
+    "a bomb": (STYLES, bytes(table.MOST_BYTES), f"expected {table.MOST_BYTES} at most"),
 }
 
 

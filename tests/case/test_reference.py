@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from kincheck import CaseError, Outcome
 from kincheck.adapters.native import Native
 from kincheck.core.case.curves import (
     Printed,
@@ -19,9 +20,8 @@ from kincheck.core.case.curves import (
 from kincheck.core.case.io import reference_samples
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.notes import notes
-from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import Curve, deviation
-from kincheck.core.harness.record import Outcome, from_json, to_json
+from kincheck.core.harness.record import from_json, to_json
 from kincheck.core.harness.run import run
 from scipy.interpolate import CubicSpline
 
@@ -81,10 +81,7 @@ REFERENCES = [
     ),
     (CSV.replace("1.5", "1_5"), "line 5 ... column tip_x ... '1_5' ... correct it"),
     (CSV.replace("1.5", "nan"), "line 5 ... column tip_x ... 'nan' ... finite"),
-    (
-        CSV.replace("1.5", "1e308"),
-        "line 5 ... column tip_x ... '1e308' ... at most 1e+100",
-    ),
+    (CSV.replace("1.5", "1e308"), "line 5 ... column tip_x ... '1e308' ... at most 1e+100"),
     (CSV.replace("1.5", ""), "line 5 ... column tip_x ... expected a finite number"),
     (CSV.replace("1.5, ", ""), "line 5 ... found 2 numbers ... expected 3"),
     (CSV.replace("tip_x,", "tip_z,"), "line 3 ... 'tip_z' ... did you mean 'tip_x'"),
@@ -113,8 +110,7 @@ def test_broken_reference_is_refused(tmp_path, text, fragments):
 def test_absolute_reference_path_is_refused(tmp_path):
     name = write(tmp_path, CSV, "tip.csv").as_posix()
     complains(
-        write(tmp_path, BASE + BY_FILE.replace("tip.csv", name)),
-        "reference.file ... give its name",
+        write(tmp_path, BASE + BY_FILE.replace("tip.csv", name)), "reference.file ... give its name"
     )
 
 

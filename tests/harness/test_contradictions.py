@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
+from kincheck import Outcome, adapters, cases
 from kincheck.core.case.case import Series
 from kincheck.core.harness.execution import Attempt, Failure, attempt
-from kincheck.core.harness.record import Outcome, from_json, to_json
+from kincheck.core.harness.record import from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.mechanism.motions import Waypoints
 from kincheck.core.report.report import headline

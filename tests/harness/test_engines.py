@@ -9,13 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
-from kincheck.core import Distance
+from kincheck import Distance, Outcome, adapters, cases
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.cli import main
 from kincheck.core.cli.registry import Status
 from kincheck.core.harness.engine import Unloadable, versions
-from kincheck.core.harness.record import Outcome
 
 from ..support.fakes import record_of, run_case
 from ..support.mechanisms import placed

@@ -9,7 +9,7 @@ import time
 from collections import Counter
 
 import pytest
-from kincheck.core.harness.record import Outcome
+from kincheck import Outcome
 from kincheck.core.history.store import Store
 
 from ..support.sources import ROOT

@@ -9,9 +9,9 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from kincheck import CaseError, Mechanism, PointCoordinate
 from kincheck.core.case.case import NO_SIZE, Output, Series, size
 from kincheck.core.cli import main
-from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import (
     Curve,
     as_numbers,
@@ -23,8 +23,6 @@ from kincheck.core.harness.compare import (
 )
 from kincheck.core.harness.record import from_json, to_json
 from kincheck.core.harness.run import run
-from kincheck.core.mechanism.mechanism import Mechanism
-from kincheck.core.mechanism.motions import PointCoordinate
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.table import print_table
 

@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck import CaseError, Outcome, SolveError
 from kincheck.core.case.case import Series, Truth
-from kincheck.core.errors import CaseError, SolveError
-from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import NULL_REASONS, run
 from kincheck.core.report.curves import wide
 

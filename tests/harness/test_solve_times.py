@@ -3,8 +3,8 @@
 from itertools import accumulate, chain
 
 import pytest
+from kincheck import Outcome
 from kincheck.core.harness import execution
-from kincheck.core.harness.record import Outcome
 
 from ..support.fakes import SAMPLES, Fake, off, record_of, solution
 

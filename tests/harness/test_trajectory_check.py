@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck import Outcome, Trajectory
 from kincheck.core.forces import Forces
 from kincheck.core.harness.native_engine import NativeEngine
-from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.trajectory_check import BadTrajectoryError, check
-from kincheck.core.trajectory import Trajectory
 
 from ..support.engine_faults import changed
 from ..support.engine_forces import force_case

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from kincheck import CaseError, KincheckError, Outcome, Results
 from kincheck.core.cli import main
-from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.harness.execution import solve_in_process
-from kincheck.core.harness.record import Outcome, Results, to_json
+from kincheck.core.harness.record import to_json
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.store import HistoryError, Store

@@ -11,10 +11,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from kincheck import cases
+from kincheck import Outcome, cases
 from kincheck.core.case.case import ORDERS, Output, Series
 from kincheck.core.harness.compare import deviations, output_series
-from kincheck.core.harness.record import Outcome, from_json, to_json
+from kincheck.core.harness.record import from_json, to_json
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.queries import faultless, read

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from kincheck import Outcome
 from kincheck.core.extras import THREADS
 from kincheck.core.harness.execution import LONGEST_MESSAGE, solve_in_process
-from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
 from kincheck.core.harness.workers.pool import in_workers

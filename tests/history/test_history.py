@@ -11,9 +11,9 @@ from base64 import b64decode
 from pathlib import Path
 
 import pytest
+from kincheck import KincheckError, Outcome, Results
 from kincheck.core.cli.main import main
-from kincheck.core.errors import KincheckError
-from kincheck.core.harness.record import Outcome, Results, to_json
+from kincheck.core.harness.record import to_json
 from kincheck.core.history.queries import NUMBERS, export, faultless, read
 from kincheck.core.history.store import HistoryError, Store
 from kincheck.core.report.figures import Past, trend_figures

@@ -6,8 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
+from kincheck import Outcome
 from kincheck.core.case.io.atomic_files import written
-from kincheck.core.harness.record import Outcome, to_json
+from kincheck.core.harness.record import to_json
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.runs import find, find_against
 from kincheck.core.history.runs import keep as begin

@@ -5,8 +5,9 @@ import random
 
 import msgspec
 import pytest
+from kincheck import Outcome
 from kincheck.core.cli.main import main
-from kincheck.core.harness.record import Outcome, OutputSeries, Seconds, to_json
+from kincheck.core.harness.record import OutputSeries, Seconds, to_json
 from kincheck.core.history.findings import Kind, Regressions
 from kincheck.core.history.store import Store
 from kincheck.core.report.junit import to_regression_junit
@@ -294,10 +295,7 @@ def test_regression_junit_keeps_skips(path):
 def test_regression_markdown_escapes_and_folds(path):
     nights(path, 1)
     message = "</details> | `x` @team"
-    keep(
-        path,
-        [replace(each, outcome=Outcome.ERROR, message=message) for each in records()],
-    )
+    keep(path, [replace(each, outcome=Outcome.ERROR, message=message) for each in records()])
     text = to_markdown(reported(path))
     assert (
         "| native, mujoco | first, second | pass → error: &lt;/details&gt; \\| \\`x\\` @\u2060team"
@@ -363,10 +361,7 @@ def found_after(path, **now):
 
 @pytest.mark.parametrize(
     ("motion", "values", "size"),
-    [
-        ("position", [0.0, -0.5, None], "1 m "),
-        ("velocity", [1.0, 1.001, None], "1e-3 m/s "),
-    ],
+    [("position", [0.0, -0.5, None], "1 m "), ("velocity", [1.0, 1.001, None], "1e-3 m/s ")],
 )
 def test_changed_values_are_reported_moved(path, motion, values, size):
     moved, messages, found = found_after(path, **{motion: values})

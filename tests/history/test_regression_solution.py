@@ -5,7 +5,7 @@ now, pairs that are missing.
 import re
 
 import pytest
-from kincheck.core.harness.record import Outcome
+from kincheck import Outcome
 from kincheck.core.history.findings import WHY, Kind
 from kincheck.core.report.regressions import to_markdown
 from kincheck.core.trajectory import QUANTITIES
@@ -186,11 +186,7 @@ def test_pair_of_last_run_is_missing(path, capsys):
 
 def test_changed_command_has_no_missing_pairs(path, capsys):
     keep(path, records()[:2])
-    keep(
-        path,
-        [replace(each, case="mine") for each in records()],
-        command="kincheck run mine.toml",
-    )
+    keep(path, [replace(each, case="mine") for each in records()], command="kincheck run mine.toml")
     keep(path, records()[:2])
     assert report(path, "--missing-is-failure") == 0
     assert "not in this run" not in capsys.readouterr().out

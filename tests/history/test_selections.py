@@ -1,7 +1,7 @@
 """What a report judges: the latest run of the same selection, red until the same thing is green."""
 
 import pytest
-from kincheck.core.harness.record import Outcome
+from kincheck import Outcome
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.store import Store
 

@@ -6,9 +6,9 @@ import dataclasses
 import random
 
 import pytest
+from kincheck import Outcome
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.harness.provenance import case_facts
-from kincheck.core.harness.record import Outcome
 from kincheck.core.history.findings import Kind
 from msgspec.structs import replace
 

@@ -7,7 +7,7 @@ import random
 
 import numpy as np
 import pytest
-from kincheck.core.harness.record import Outcome
+from kincheck import Outcome
 from kincheck.core.history.queries import read
 from kincheck.core.history.steps import change_points, standing_steps, steps
 from kincheck.core.history.store import Store
@@ -116,8 +116,7 @@ def test_error_step_names_worst_output(path):
     nights(path, 3)
     both = changed(changed(records(), **worse(20.0, "x")), **worse(200.0, "y"))
     keep(
-        path,
-        [replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in both],
+        path, [replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in both]
     )
     (step,) = found(path)
     assert (step.quantity, step.output, step.first) == ("position", "y", 4)

@@ -6,19 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
+    Case,
     Cylindrical,
     JointDisplacement,
     Mechanism,
     Point,
     PointCoordinate,
+    Ramp,
     Revolute,
+    Sine,
     SolveError,
     solve,
 )
-from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.mechanism.motions import Absolute, Ramp, Sine
+from kincheck.core.case.case import Output, Sweep, Truth
+from kincheck.core.mechanism.motions import Absolute
 
 from ..support.mechanisms import Z
 

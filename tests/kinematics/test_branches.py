@@ -4,20 +4,20 @@ sections 3 and 4).
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
     ConstantVelocity,
     Gear,
     JointAngle,
     Mechanism,
     Point,
+    Ramp,
     Revolute,
+    solve,
 )
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, Vec3, X, Y, Z
-from kincheck.core.kinematics.one_design import solve
-from kincheck.core.mechanism.motions import Ramp
-from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
+from kincheck.core.primitives import GROUND_POSE, Drive, Pose
 
 from ..oracles import naive
 from ..support.mechanisms import ORIGIN, solve_all

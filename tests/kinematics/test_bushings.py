@@ -8,17 +8,15 @@ import re
 
 import numpy as np
 import pytest
+from kincheck import GROUND, Body, KincheckError, Mechanism, MechanismError
 from kincheck.adapters.shared.force_solution import curve_force, elastic_torque
 from kincheck.core.algebra import ZERO, Quat, vec
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.doors import offers
-from kincheck.core.errors import KincheckError, MechanismError
 from kincheck.core.kinematics.forces.equations import BodyStates, bushing, force_of
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Bushing
-from kincheck.core.mechanism.mechanism import GROUND, Mechanism
-from kincheck.core.primitives.base import Pose
+from kincheck.core.primitives import Pose
 
 from ..support.engine_motion import ENGINES, installed
 from ..support.loads import solved, traced

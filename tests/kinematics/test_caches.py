@@ -10,19 +10,19 @@ from weakref import WeakSet
 
 import numpy as np
 import pytest
-from kincheck.core import Spherical, Supplied, solve
-from kincheck.core.caches import KEYS, ThreadCache, cache_last, clear_caches
+from kincheck import Ramp, Sine, Spherical, Supplied, Table, clear_caches, solve
+from kincheck.core.caches import KEYS, ThreadCache, cache_last
 from kincheck.core.case import quantity
 from kincheck.core.case.models.files import load
 from kincheck.core.case.quantity import Output
-from kincheck.core.kinematics import placed, places
+from kincheck.core.kinematics import WantedOutput, placed, places
 from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled import routes as samples
 from kincheck.core.kinematics.compiled.compiled_model import source_files
-from kincheck.core.kinematics.compiled.request import Request, WantedOutput
+from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation import walk
 from kincheck.core.kinematics.one_design import prepare
-from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
+from kincheck.core.mechanism.motions import Absolute, Motion, Path
 from kincheck.core.program.executor import compiler
 
 from ..support.fakes import calls

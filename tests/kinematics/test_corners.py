@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
     ConstantVelocity,
     Distance,
@@ -17,7 +17,7 @@ from kincheck.core import (
     Revolute,
     solve,
 )
-from kincheck.core.kinematics.formulation.styles import styles
+from kincheck.core.kinematics import styles
 
 from ..support.mechanisms import ORIGIN, Z, circles_meet, planar_four_bar, solve_all
 
@@ -67,8 +67,7 @@ def latin(rows, columns, others):
 
 @pytest.mark.by_day(3)
 @pytest.mark.parametrize(
-    ("beside", "count", "loops"),
-    latin([1e-2, 1e-3, -1e-4, 1e-5, -3e-6], [2, 3, 8, 400], [1, 2]),
+    ("beside", "count", "loops"), latin([1e-2, 1e-3, -1e-4, 1e-5, -3e-6], [2, 3, 8, 400], [1, 2])
 )
 def test_corner_is_turned(beside, count, loops):
     """The rocker makes half a turn while the crank's pin passes its pivot."""

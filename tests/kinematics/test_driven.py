@@ -5,8 +5,7 @@ one does, and is told alike.
 from dataclasses import replace
 
 import pytest
-from kincheck import cases
-from kincheck.core import (
+from kincheck import (
     Body,
     Fixed,
     Gear,
@@ -16,15 +15,12 @@ from kincheck.core import (
     Revolute,
     SolveError,
     Spherical,
+    cases,
 )
 from kincheck.core.cli import main
+from kincheck.core.kinematics import degrees_of_freedom, require_driven
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.structure.degrees_of_freedom import (
-    DENSE,
-    account,
-    degrees_of_freedom,
-    require_driven,
-)
+from kincheck.core.kinematics.structure.degrees_of_freedom import DENSE, account
 
 from ..support.case_texts import write
 from ..support.mechanisms import Z, chain, slider_crank

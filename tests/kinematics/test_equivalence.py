@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters
-from kincheck.core import (
+from kincheck import (
     Body,
+    Case,
     Cylindrical,
     Distance,
     Inline,
@@ -21,8 +21,9 @@ from kincheck.core import (
     RevoluteSpherical,
     Spherical,
     Universal,
+    adapters,
 )
-from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core.case.case import Output, Sweep, Truth
 
 from ..support.mechanisms import A0, B0, C0, D0, four_bar, mcpherson
 

@@ -7,13 +7,28 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import solve
-from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck import (
+    Body,
+    Case,
+    Cylindrical,
+    Gear,
+    JointAngle,
+    JointDisplacement,
+    Mechanism,
+    Point,
+    Ramp,
+    Revolute,
+    Sine,
+    Spherical,
+    Translational,
+    Universal,
+    solve,
+)
+from kincheck.core.case.case import Sweep, Truth
 from kincheck.core.case.measures import Component, Orientation
 from kincheck.core.case.measures import JointAngle as Angle
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.compare import output_series
-from kincheck.core.joints import Cylindrical, Gear, Revolute, Spherical, Translational, Universal
 from kincheck.core.kinematics import (
     NativeSolver,
     angle_with_turns,
@@ -23,26 +38,25 @@ from kincheck.core.kinematics import (
     in_doubt,
     near_design,
 )
-from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.one_design import prepare as prepare_one
 from kincheck.core.mechanism.loads import TorsionSpringDamper
-from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
-from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Path, Ramp, Sine
+from kincheck.core.mechanism.motions import Path
 
 from ..support.mechanisms import X, Z
 
 BEND = 0.8  # cosine of the angle between the shafts
 
 
-def shafts() -> Mechanism:
+def shafts(bend=BEND):
     """Hooke's joint between two shafts, with a torsional spring on the driven one."""
+    across = math.sqrt(1 - bend**2)
     return Mechanism(
         "shafts",
         [Body("first", mass=1.0), Body("second", mass=1.0)],
         [
             Revolute("a", "ground", "first", (0.0, 0.0, 0.0), X),
-            Universal("u", "first", "second", X, (Z, (-0.6, 0.8, 0.0))),
-            Cylindrical("b", "ground", "second", (1.8, 0.6, 0.0), (0.8, 0.6, 0.0)),
+            Universal("u", "first", "second", X, (Z, (-across, bend, 0.0))),
+            Cylindrical("b", "ground", "second", (1 + bend, across, 0.0), (bend, across, 0.0)),
         ],
         [Point("P", "second", (1.8, 0.6, 0.0))],
         [JointAngle("turn", "a")],
@@ -50,21 +64,21 @@ def shafts() -> Mechanism:
     )
 
 
-def driven(x):
+def driven(x, bend=BEND):
     """The closed form: tan(b) = tan(a) cos(bend), b turning with a."""
     x = np.asarray(x, dtype=float)
-    less = (BEND - 1) * np.sin(x) * np.cos(x)
-    return x + np.arctan2(less, np.cos(x) ** 2 + BEND * np.sin(x) ** 2)
+    less = (bend - 1) * np.sin(x) * np.cos(x)
+    return x + np.arctan2(less, np.cos(x) ** 2 + bend * np.sin(x) ** 2)
 
 
-def series(case: Case, order: int = 2):
+def series(case, order=2):
     """Values of the outputs of a case, shape (outputs, n)."""
     solver = NativeSolver(order=order)
     motion = solver.prepare(case.mechanism, case.sweep.path, list(case.points))(1e-12)
     return np.array([output_series(case, output, motion).position for output in case.outputs])
 
 
-def angles(sweep: Sweep, joint: str):
+def angles(sweep, joint):
     output = Angle("angle", 1e-9, 0.0, "test", joint)
     mechanism = with_markers(shafts(), [output])
     return series(Case("shafts", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, (output,)))[0]
@@ -72,12 +86,7 @@ def angles(sweep: Sweep, joint: str):
 
 @pytest.mark.parametrize(
     "values",
-    [
-        [0.0, 6 * math.pi],
-        np.linspace(-10 * math.pi, 50 * math.pi, 7),
-        [101.0, 60.0, -40.0],
-        [60.0],
-    ],
+    [[0.0, 6 * math.pi], np.linspace(-10 * math.pi, 50 * math.pi, 7), [101.0, 60.0, -40.0], [60.0]],
     ids=str,
 )
 def test_angle_turns_between_distant_samples(values):
@@ -85,17 +94,21 @@ def test_angle_turns_between_distant_samples(values):
     assert turned == pytest.approx(driven(values), abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "motion",
-    [Sine(10.0, 1.0, math.pi / 2), Sine(-40.0, 0.3, 0.5)],
-    ids=str,
-)
+@pytest.mark.parametrize("motion", [Sine(10.0, 1.0, math.pi / 2), Sine(-40.0, 0.3, 0.5)], ids=str)
 def test_angle_turns_from_offset_start(motion):
     times = np.array([0.0, 0.1, 0.2])
     values = motion.at(times)[0]
     sweep = Sweep("time", times, motions={"turn": motion})
     assert angles(sweep, "a") == pytest.approx(values, abs=1e-9)
     assert angles(sweep, "b") == pytest.approx(driven(values), abs=1e-9)
+
+
+def test_quick_turns_before_start_are_followed():
+    """Between shafts almost at a right angle, the driven one turns half round in 0.1 rad."""
+    bend, motion = 0.02, Sine(10.0, 1.0, math.pi / 2)
+    path = Path({"turn": motion}, np.array([0.0, 0.01]))
+    found = angle_with_turns(shafts(bend), path, "b")
+    assert found == pytest.approx(driven(motion.at(path.times)[0], bend), abs=1e-6)
 
 
 def test_torsion_spring_counts_turns():
@@ -145,7 +158,7 @@ def test_angle_at_fold_adds_no_turn():
 def test_angles_share_one_followed_motion(monkeypatch):
     asked: list[int] = []
 
-    def prepare(mechanism: Mechanism, request: Request, path: Path):
+    def prepare(mechanism, request, path):
         asked.append(len(request.bodies))
         return prepare_one(mechanism, request, path)
 
@@ -179,11 +192,11 @@ MECHANISM = with_markers(
 )
 
 
-def case(sweep: Sweep) -> Case:
+def case(sweep):
     return Case("tumbler", "test", Truth.CONSENSUS_ONLY, MECHANISM, sweep, tuple(OUTPUTS))
 
 
-def swept(values) -> Case:
+def swept(values):
     return case(Sweep("turn", np.array(values, dtype=float), motions={"bend": Ramp(RATIO)}))
 
 

@@ -9,7 +9,7 @@ from kincheck.core.algebra import ZERO
 from kincheck.core.kinematics.forces import equations
 from kincheck.core.kinematics.forces import equations as demand
 from kincheck.core.mechanism.loads import SpringDamper
-from kincheck.core.primitives.base import GROUND_POSE, Pose, Twist
+from kincheck.core.primitives import GROUND_POSE, Pose, Twist
 from kincheck.core.program import elimination
 
 from ..oracles import newton_euler

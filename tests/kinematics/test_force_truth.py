@@ -6,22 +6,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import solve
-from kincheck.core.joints import (
+from kincheck import (
+    Body,
+    BodyMotion,
     Gear,
+    JointAngle,
+    Mechanism,
+    Point,
     Revolute,
     Screw,
+    Trajectory,
+    cases,
+    solve,
 )
+from kincheck.core.kinematics import forces_of
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.forces.reactions import forces_of
 from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism import motions
-from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
-from kincheck.core.mechanism.mechanism import Mechanism, Point
-from kincheck.core.mechanism.motions import JointAngle
-from kincheck.core.trajectory import BodyMotion, Trajectory
 
 from ..oracles import naive, newton_euler
 from ..support.adams_single_joints import CASES, right

@@ -6,18 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import solve
-from kincheck.core.errors import SolveError
-from kincheck.core.joints import Gear, Revolute, Screw
+from kincheck import (
+    Body,
+    Gear,
+    JointAngle,
+    Mechanism,
+    Ramp,
+    Revolute,
+    Screw,
+    Sine,
+    SolveError,
+    cases,
+    solve,
+)
 from kincheck.core.kinematics import Method, NativeSolver, styles, with_forces
 from kincheck.core.kinematics.compiled import traced_forces
 from kincheck.core.kinematics.compiled.solution import ForceTable
 from kincheck.core.kinematics.forces.wanted import wanted_forces
-from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
-from kincheck.core.mechanism.mechanism import Mechanism
-from kincheck.core.mechanism.motions import JointAngle, Path, Ramp, Sine
+from kincheck.core.mechanism.motions import Path
 from kincheck.core.program.executor import compiler
 
 from ..oracles import naive, newton_euler

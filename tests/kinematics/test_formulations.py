@@ -9,6 +9,7 @@ import kincheck.cases
 import numpy as np
 import pytest
 from kincheck.core.case.joint_probe import probes
+from kincheck.core.kinematics import NATIVE, styles
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
@@ -18,7 +19,6 @@ from kincheck.core.kinematics.formulation.acceptance_criteria import (
     Limits,
     margins,
 )
-from kincheck.core.kinematics.formulation.styles import NATIVE, styles
 
 OTHERS = styles()[1:]
 ORDERS = ("position", "velocity", "acceleration")

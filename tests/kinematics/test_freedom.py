@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
     Distance,
     Fixed,
@@ -21,10 +21,10 @@ from kincheck.core import (
     Spherical,
     Translational,
     Universal,
+    solve,
 )
 from kincheck.core.failures import FailureKind
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.one_design import solve
 from kincheck.core.kinematics.structure.degrees_of_freedom import account
 
 from ..support.mechanisms import (

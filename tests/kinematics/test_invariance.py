@@ -6,13 +6,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import Body, Mechanism, Point, PointCoordinate, Revolute, Translational
-from kincheck.core.joints import AxialJoint, Joint, ParallelAxes, Screw
+from kincheck import (
+    Body,
+    Joint,
+    Mechanism,
+    ParallelAxes,
+    Point,
+    PointCoordinate,
+    Revolute,
+    Screw,
+    Translational,
+    cases,
+    solve,
+)
+from kincheck.core.joints import AxialJoint
 from kincheck.core.joints.base import position
+from kincheck.core.kinematics import places
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.formulation.parameters import places
-from kincheck.core.kinematics.one_design import solve
 
 from ..support.mechanisms import (
     ORIGIN,
@@ -163,10 +173,7 @@ def test_motion_invariant_to_orientation():
 @pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3, 1.0, 1e3])
 @pytest.mark.parametrize(
     "joint",
-    [
-        Revolute("r", "ground", "a", ORIGIN, Z),
-        ParallelAxes("r", "ground", "a", Z),
-    ],
+    [Revolute("r", "ground", "a", ORIGIN, Z), ParallelAxes("r", "ground", "a", Z)],
     ids=["revolute", "parallel axes"],
 )
 def test_length_unit_of_single_joint(size, joint):

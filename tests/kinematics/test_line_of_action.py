@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from kincheck import Cylindrical, Planar, Revolute, Screw, Translational
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
-from kincheck.core.joints import Cylindrical, Planar, Revolute, Screw, Translational
-from kincheck.core.joints.base import AxialJoint, triad
+from kincheck.core.joints import AxialJoint
+from kincheck.core.joints.base import triad
 from kincheck.core.kinematics import NativeSolver, styles, with_forces
 
 from ..support.driven_chains import COUPLINGS, SLOW, Link, chain, deviation, pushed_slide

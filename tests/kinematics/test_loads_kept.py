@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 import pytest
+from kincheck import Body
 from kincheck.adapters.shared.equivalents import in_own_frame, own_frame
-from kincheck.core.kinematics.formulation.parameters import placed, places
-from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.mechanism import Mechanism
+from kincheck.core.kinematics import placed, places
 
 from ..support.loaded_slider_crank import GRAVITY, case_of, loaded, pushed
 
@@ -14,7 +13,7 @@ SIMULATION = "kincheck.adapters.simulate.simulation"
 REDUCTION = "kincheck.core.extensions.laboratory.stress.reduction"
 
 
-def same_loads(a: Mechanism, b: Mechanism) -> None:
+def same_loads(a, b):
     assert (a.gravity, a.forces) == (b.gravity, b.forces)
     assert {each.name: each for each in a.bodies if each.mass} == {
         each.name: each for each in b.bodies if each.mass

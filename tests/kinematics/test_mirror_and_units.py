@@ -7,11 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import adapters
-from kincheck.core import (
-    RackPinion,
-    Screw,
-)
+from kincheck import RackPinion, Screw, adapters
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.joints import Follower

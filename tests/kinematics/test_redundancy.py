@@ -4,17 +4,17 @@ are good for the whole sweep.
 
 import numpy as np
 import pytest
-from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve
+from kincheck import Body, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core.algebra import ZERO, Quat, vec
+from kincheck.core.kinematics import Cartesian, constraints
 from kincheck.core.kinematics.compiled.programs import Tracer
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.formulation.cartesian import Cartesian
-from kincheck.core.kinematics.formulation.constraints import constraints, frames
+from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.formulation.formulation import Condition
 from kincheck.core.kinematics.formulation.state_vectors import jacobian
 from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
 from kincheck.core.kinematics.structure.redundancy import independent_rows
-from kincheck.core.primitives.base import Pose
+from kincheck.core.primitives import Pose
 from kincheck.core.program import Elimination
 
 from ..support.mechanisms import Z, errors, solve_all

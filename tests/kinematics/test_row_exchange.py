@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.cases import bennett
-from kincheck.cases.jet import Jet
+from kincheck import Ramp, Sine, cases, solve
+from kincheck.cases import Jet, bennett
+from kincheck.core.kinematics import styles
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import SIGMA, Request
 from kincheck.core.kinematics.compiled.routes import Route
@@ -16,9 +16,7 @@ from kincheck.core.kinematics.continuation import segments, singular_samples
 from kincheck.core.kinematics.continuation.segments import Followed, choose_rows, with_better_rows
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import SideWalk, follow_samples
-from kincheck.core.kinematics.formulation.styles import styles
-from kincheck.core.kinematics.one_design import solve
-from kincheck.core.mechanism.motions import Path, Ramp, Sine
+from kincheck.core.mechanism.motions import Path
 
 from ..support.mechanisms import BRANCH, chain, chain_end, errors, solve_all
 from .test_redundancy import LEFT, locomotive, rim
@@ -185,10 +183,7 @@ def test_known_rows_are_chosen_if_good():
     # there are not two
     assert choose_rows(
         np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1e-17]]), [(0, 1)], drivers, none
-    ) == (
-        0,
-        1,
-    )
+    ) == (0, 1)
 
 
 def test_pose_off_chosen_rows_is_refused():

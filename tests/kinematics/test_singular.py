@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import cases
+from kincheck import Joint, cases, solve
 from kincheck.adapters.native import Native
 from kincheck.core.case.joint_probe import probe
 from kincheck.core.harness.run import run
-from kincheck.core.joints import Joint
 from kincheck.core.kinematics.compiled import dense_equations
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.dense_equations import System
@@ -19,7 +18,6 @@ from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import follow_samples, longest
 from kincheck.core.kinematics.formulation.acceptance_criteria import is_uncertain
-from kincheck.core.kinematics.one_design import solve
 from mpmath import mp, mpf
 
 from ..support.mechanisms import (

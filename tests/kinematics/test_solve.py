@@ -9,24 +9,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import (
+from kincheck import (
     Body,
+    Cylindrical,
     Distance,
     JointDisplacement,
     Mechanism,
     Point,
+    PointMotion,
+    Ramp,
     Revolute,
+    Screw,
     SolveError,
     Translational,
+    cases,
+    solve,
 )
-from kincheck.core.joints import Cylindrical, Screw
+from kincheck.core.kinematics import styles
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import RATE, RATE_T, Request
-from kincheck.core.kinematics.formulation.styles import styles
-from kincheck.core.kinematics.one_design import solve
-from kincheck.core.mechanism.motions import Ramp
-from kincheck.core.trajectory import Motions, PointMotion
+from kincheck.core.trajectory import Motions
 
 from ..oracles import naive
 from ..support.mechanisms import (
@@ -323,10 +325,7 @@ def test_solve_without_samples(name):
         ({"motions": {"stroke": Ramp(1.0)}}, "motions has 'stroke', which is swept; leave it out"),
         ({"motions": {"steer": Ramp(1.0)}}, "there is no driver 'steer'"),
         ({"motions": {"steer": 3.0}}, r"motions\['steer'\] is 3.0, expected a motion"),
-        (
-            {"style": "dads"},
-            "there is no style 'dads'; known: native, mixed",
-        ),
+        ({"style": "dads"}, "there is no style 'dads'; known: native, mixed"),
     ],
     ids=str,
 )

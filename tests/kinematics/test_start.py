@@ -7,27 +7,30 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters
-from kincheck.adapters.exudyn.exudyn import Exudyn
-from kincheck.adapters.mujoco.mujoco import MuJoCo
-from kincheck.adapters.pinocchio.pinocchio import Pinocchio
-from kincheck.core import (
+from kincheck import (
     Body,
+    Case,
     JointAngle,
     Mechanism,
     Point,
     PointCoordinate,
     RackPinion,
+    Ramp,
     Revolute,
+    Sine,
+    Table,
     Translational,
+    adapters,
     solve,
 )
-from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.adapters.exudyn.exudyn import Exudyn
+from kincheck.adapters.mujoco.mujoco import MuJoCo
+from kincheck.adapters.pinocchio.pinocchio import Pinocchio
+from kincheck.core.case.case import Output, Sweep, Truth
+from kincheck.core.kinematics import start_of, styles
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.routes import start_of
-from kincheck.core.kinematics.formulation.styles import styles
 from kincheck.core.kinematics.one_design import prepare
-from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
+from kincheck.core.mechanism.motions import Absolute, Path
 
 from ..support.block_structures import solve_components, solve_sparse
 from ..support.mechanisms import X, chain, errors, slider_crank
@@ -37,12 +40,7 @@ DESIGNS = "kincheck.core.extensions.designs.design_batch"
 RADIUS = 0.1
 TIMES = np.linspace(-0.75, 0.75, 13)
 Z = (0.0, 0.0, 1.0)
-ANGLES = [
-    60.0,
-    45.0,
-    180.0,
-    round(np.random.default_rng(7).uniform(-180.0, 180.0), 3),
-]
+ANGLES = [60.0, 45.0, 180.0, round(np.random.default_rng(7).uniform(-180.0, 180.0), 3)]
 
 
 def six(x):

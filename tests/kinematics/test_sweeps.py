@@ -6,22 +6,24 @@ from functools import cache
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
     Distance,
     JointAngle,
     Mechanism,
     Point,
     PointCoordinate,
+    Ramp,
     Revolute,
     Spherical,
+    solve,
 )
-from kincheck.core.kinematics import Method, NativeSolver, solve
+from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.kinematics.continuation.walk import FINER, ROOM, SideWalk
-from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.mechanism.motions import Path
 
 from ..support.mechanisms import (
     CRANK,

@@ -6,7 +6,7 @@ Where it stands says nothing of the turns, but a wheel that is geared to it does
 
 import numpy as np
 import pytest
-from kincheck.core.kinematics.formulation.styles import styles
+from kincheck.core.kinematics import styles
 
 from ..support.mechanisms import indexed, indexing, solve_all
 

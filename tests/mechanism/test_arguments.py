@@ -9,8 +9,7 @@ from functools import partial
 import kincheck
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import (
+from kincheck import (
     Body,
     Distance,
     JointAngle,
@@ -19,9 +18,11 @@ from kincheck.core import (
     Point,
     Revolute,
     SolveError,
+    Table,
+    cases,
     solve,
 )
-from kincheck.core.mechanism.motions import Motion, Table
+from kincheck.core.mechanism.motions import Motion
 
 from ..support.mechanisms import chain, mcpherson
 

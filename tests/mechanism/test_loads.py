@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from kincheck.core.errors import MechanismError
-from kincheck.core.joints import Revolute, Spherical
+from kincheck import Body, Mechanism, MechanismError, Revolute, Spherical
 from kincheck.core.mechanism import body
-from kincheck.core.mechanism.body import Body, Dimension, inertia_matrix
+from kincheck.core.mechanism.body import Dimension, inertia_matrix
 from kincheck.core.mechanism.loads import (
     ELEMENTS,
     Axes,
@@ -14,7 +13,6 @@ from kincheck.core.mechanism.loads import (
     Torque,
     TorsionSpringDamper,
 )
-from kincheck.core.mechanism.mechanism import Mechanism
 
 from ..support.mechanisms import ORIGIN, X
 

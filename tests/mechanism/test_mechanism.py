@@ -7,25 +7,30 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
     Cylindrical,
     Distance,
+    Fixed,
     Gear,
+    Joint,
     JointAngle,
     Mechanism,
     MechanismError,
+    PerpendicularAxes,
     Point,
     PointCoordinate,
+    Ramp,
     Revolute,
+    Screw,
     Spherical,
+    Table,
+    Universal,
     UnknownNameError,
+    clear_caches,
     solve,
 )
-from kincheck.core.caches import clear_caches
-from kincheck.core.joints import Fixed, Joint, PerpendicularAxes, Screw, Universal
 from kincheck.core.mechanism.loads import TorsionSpringDamper
-from kincheck.core.mechanism.motions import Ramp, Table
 from kincheck.core.mechanism.tree import spanning_tree
 from kincheck.core.studies.checks.check_joint import specimens_of
 
@@ -79,14 +84,8 @@ WRONG = [
         lambda: Revolute("a", "b", "c", (1, 2), (0, 0, 1)),
         "joint 'a' (revolute): point is (1, 2), expected a point",
     ),
-    (
-        lambda: Distance("a", "b", "c", (1, 2, 3)),
-        "points is (1, 2, 3), expected two points",
-    ),
-    (
-        lambda: Body("b", (0, 0, 0, 1)),
-        "body 'b': origin is (0, 0, 0, 1), expected a point",
-    ),
+    (lambda: Distance("a", "b", "c", (1, 2, 3)), "points is (1, 2, 3), expected two points"),
+    (lambda: Body("b", (0, 0, 0, 1)), "body 'b': origin is (0, 0, 0, 1), expected a point"),
     (
         lambda: PointCoordinate("d", "end", (0, 1)),
         "driver 'd': direction is (0, 1), expected a direction",
@@ -103,10 +102,7 @@ WRONG = [
         lambda: Revolute("a", "b", "c", (0, 0, 0), (0, 0, 1e-200)),
         "axis has length 1e-200, whose square",
     ),
-    (
-        lambda: PointCoordinate("d", "P", (0, 0, 0)),
-        "driver 'd': direction is zero",
-    ),
+    (lambda: PointCoordinate("d", "P", (0, 0, 0)), "driver 'd': direction is zero"),
     (lambda: Ramp("a"), "ramp motion: rate is 'a'; give a finite number"),
     (
         lambda: Revolute("a", "b", "c", (0, 0, 0), None),
@@ -123,10 +119,7 @@ WRONG = [
         lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), 0.0),
         "length is 0 m, expected a positive one",
     ),
-    (
-        lambda: Distance("a", "b", "c", ((1, 0, 0), (1, 0, 0)), 2.0),
-        "the points coincide at design",
-    ),
+    (lambda: Distance("a", "b", "c", ((1, 0, 0), (1, 0, 0)), 2.0), "the points coincide at design"),
     (
         lambda: PerpendicularAxes("a", "b", "c", ((1, 0, 0), (0.02, 1, 0))),
         "joint 'a' (perpendicular_axes): the axes are not perpendicular, the cosine of their angle"
@@ -148,10 +141,7 @@ WRONG = [
         lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), [1.0]),
         "lead = [1.0] is not finite; give a length",
     ),
-    (
-        lambda: Gear("g", ("a", "b"), ratio=np.array(1 + 2j)),
-        "ratio = (1+2j) is not finite",
-    ),
+    (lambda: Gear("g", ("a", "b"), ratio=np.array(1 + 2j)), "ratio = (1+2j) is not finite"),
     (
         lambda: Ramp(np.complex128(0.1 + 5j)),
         "ramp motion: rate is np.complex128(0.1+5j); give a finite number",
@@ -251,7 +241,7 @@ def test_grounded_joint_conflicts_are_refused():
 
 
 @pytest.mark.parametrize("kind", ["body", "joint", "point", "driver", "force"])
-def test_unknown_name_suggests_similar(kind: str):
+def test_unknown_name_suggests_similar(kind):
     """It is a KeyError too, as of any mapping."""
     mechanism = Mechanism(
         "arm",

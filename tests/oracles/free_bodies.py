@@ -19,7 +19,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from kincheck.core.mechanism.motions import PointCoordinate
+from kincheck import PointCoordinate
 
 from .rods import rotation
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-from kincheck.core.extensions.trees.assembly import Assembled
 
 from .newton import least_squares
 
@@ -17,7 +14,7 @@ COUNTS = {FREE: (6, 7), BALL: (3, 4)}
 """Unknowns and coordinates of joints; of others one."""
 
 
-def compiled(file: Path) -> mujoco.MjModel:
+def compiled(file):
     """Return MuJoCo's own reading of a file, without what needs meshes, and without contacts."""
     spec: Any = mujoco.MjSpec.from_file(str(file))
     kinds = mujoco.mjtGeom
@@ -51,7 +48,7 @@ class MujocoNewton:
         residual: of all equalities after the last move [m or rad].
     """
 
-    def __init__(self, file: Path, assembled: Assembled, fixed: Collection[str]) -> None:
+    def __init__(self, file, assembled, fixed):
         self.model, self.residual = compiled(file), 0.0
         self.data = mujoco.MjData(self.model)
         self.weak = max(1e-7, 10.0 * assembled.closing.tolerance / assembled.closing.size)
@@ -73,19 +70,19 @@ class MujocoNewton:
         self.fixed = {self.joints[name]: self._coordinates(self.joints[name]) for name in names}
 
     @property
-    def state(self) -> np.ndarray:
+    def state(self):
         """The coordinates."""
         return self.data.qpos.copy()
 
     @state.setter
-    def state(self, value: np.ndarray) -> None:
+    def state(self, value):
         self.data.qpos[:] = value
 
-    def move(self, targets: Mapping[str, float]) -> None:
+    def move(self, targets):
         """Close all equalities with joints at given coordinates [rad or m]."""
         wanted = {self.joints[name]: np.array([x]) for name, x in targets.items()} | self.fixed
 
-        def rows() -> tuple[np.ndarray, np.ndarray]:
+        def rows():
             off, slopes = [self._equalities()[0]], [self._equalities()[1]]
             for joint, value in wanted.items():
                 count = COUNTS.get(int(self.model.jnt_type[joint]), (1, 1))[0]
@@ -102,7 +99,7 @@ class MujocoNewton:
         )
         self.residual = float(np.abs(self._equalities()[0]).max(initial=0.0))
 
-    def body(self, name: str) -> tuple[np.ndarray, np.ndarray] | None:
+    def body(self, name):
         """Return position and rotation matrix of a body; None of one that is no body there."""
         if name not in self.bodies:
             return None
@@ -110,21 +107,21 @@ class MujocoNewton:
         k = self.bodies[name]
         return self.data.xpos[k].copy(), self.data.xmat[k].reshape(3, 3).copy()
 
-    def _coordinates(self, joint: int) -> np.ndarray:
+    def _coordinates(self, joint):
         at, count = (
             self.model.jnt_qposadr[joint],
             COUNTS.get(int(self.model.jnt_type[joint]), (1, 1))[1],
         )
         return self.data.qpos[at : at + count].copy()
 
-    def _apart(self, joint: int, value: np.ndarray) -> np.ndarray:
+    def _apart(self, joint, value):
         here, turn = self._coordinates(joint), np.zeros(3)
         if len(here) < 4:
             return here - value
         mujoco.mju_subQuat(turn, here[-4:], value[-4:])
         return np.concatenate([here[:-4] - value[:-4], turn])
 
-    def _turn(self, joint: int, wanted: np.ndarray) -> None:
+    def _turn(self, joint, wanted):
         """Turn a ball so that its body has an orientation."""
         mujoco.mj_kinematics(self.model, self.data)
         body, at = self.model.jnt_bodyid[joint], self.model.jnt_qposadr[joint]
@@ -134,7 +131,7 @@ class MujocoNewton:
         mujoco.mju_mulQuat(found, self._coordinates(joint), rest)
         self.data.qpos[at : at + 4] = found
 
-    def _equalities(self) -> tuple[np.ndarray, np.ndarray]:
+    def _equalities(self):
         model, data = self.model, self.data
         mujoco.mj_fwdPosition(model, data)
         slopes = np.zeros((data.nefc, model.nv))

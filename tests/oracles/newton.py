@@ -1,7 +1,5 @@
 """Newton's method in the least-squares sense, for any coordinates."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 CONVERGED = 1e-13
@@ -9,11 +7,7 @@ LONGEST = 0.3
 """Longest step [rad or m]."""
 
 
-def least_squares(
-    rows: Callable[[], tuple[np.ndarray, np.ndarray]],
-    move: Callable[[np.ndarray], None],
-    weak: float,
-) -> None:
+def least_squares(rows, move, weak):
     """Move coordinates until the residuals do not shrink.
 
     Args:

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import yaml
-from kincheck.core.extensions.trees.assembly import Assembled
 
 from .newton import least_squares
 
 AXES = {"X": "1 0 0", "Y": "0 1 0", "Z": "0 0 1"}
 
 
-def tree_of(file: Path, types: Mapping[str, str]) -> Any:
+def tree_of(file, types):
     """Return Pinocchio's reading of the tree, with the types of joints of the YAML file."""
     root = ET.parse(file).getroot()
     for joint in root.findall("joint"):
@@ -33,7 +31,7 @@ def tree_of(file: Path, types: Mapping[str, str]) -> Any:
     return pin.buildModelFromXML(ET.tostring(root, encoding="unicode"))
 
 
-def _split(root: ET.Element, joint: ET.Element, axes: str) -> None:
+def _split(root, joint, axes):
     """Make hinges of a joint, one an axis: any three independent ones are a ball."""
     name, child = str(joint.get("name")), joint.find("child")
     assert child is not None
@@ -60,7 +58,7 @@ class PinocchioNewton:
         residual: of all pairs of frames after the last move [m or rad].
     """
 
-    def __init__(self, file: Path, assembled: Assembled, fixed: Collection[str]) -> None:
+    def __init__(self, file, assembled, fixed):
         assert not fixed, "balls are hinges here, and are not held"
         beside = yaml.safe_load(file.with_suffix(".yaml").read_text())
         types = zip(beside.get("joint_name") or [], beside.get("joint_type") or [], strict=True)
@@ -79,11 +77,11 @@ class PinocchioNewton:
             self.state[joint.idx_q : joint.idx_q + joint.nq] = here
         self.move(known)
 
-    def move(self, targets: Mapping[str, float]) -> None:
+    def move(self, targets):
         """Close all pairs with joints at given coordinates [rad or m]."""
         unit = np.eye(self.model.nv)
 
-        def rows() -> tuple[np.ndarray, np.ndarray]:
+        def rows():
             off, slopes = self._pairs()
             for name, value in targets.items():
                 joint = self.model.joints[self.joints[name]]
@@ -91,13 +89,13 @@ class PinocchioNewton:
                 slopes = [*slopes, unit[joint.idx_v : joint.idx_v + 1]]
             return np.concatenate([np.zeros(0), *off]), np.vstack([unit[:0], *slopes])
 
-        def step(change: np.ndarray) -> None:
+        def step(change):
             self.state = pin.integrate(self.model, self.state, change)
 
         least_squares(rows, step, 1e-7)
         self.residual = float(np.abs(np.concatenate([np.zeros(1), *self._pairs()[0]])).max())
 
-    def body(self, name: str) -> tuple[np.ndarray, np.ndarray] | None:
+    def body(self, name):
         """Return position and rotation matrix of a link; None of one that is no link there."""
         if not self.model.existFrame(name, pin.FrameType.BODY):
             return None
@@ -105,13 +103,13 @@ class PinocchioNewton:
         place = self.data.oMf[self.model.getFrameId(name, pin.FrameType.BODY)]
         return place.translation.copy(), place.rotation.copy()
 
-    def _apart(self, joint: Any, value: float) -> float:
+    def _apart(self, joint, value):
         here = self.state[joint.idx_q : joint.idx_q + joint.nq]
         if joint.nq == 1:
             return float(here[0] - value)
         return float((np.arctan2(here[1], here[0]) - value + np.pi) % (2.0 * np.pi) - np.pi)
 
-    def _pairs(self) -> tuple[list[Any], list[Any]]:
+    def _pairs(self):
         pin.framesForwardKinematics(self.model, self.data, self.state)
         pin.computeJointJacobians(self.model, self.data, self.state)
         off, slopes = list[Any](), list[Any]()

@@ -12,19 +12,15 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from kincheck.core.case.case import Case
-from kincheck.core.case.io.reader_options import Supplied
+from kincheck import KincheckError, Supplied
 from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
-from kincheck.core.errors import KincheckError
 from kincheck.core.extensions.trees import case as trees
-from kincheck.core.extensions.trees.assembly import Assembled
-from kincheck.core.extensions.trees.driving import Driving
 from kincheck.core.extensions.trees.reader import read_tree
 from kincheck.core.kinematics import NativeSolver
 
@@ -52,11 +48,11 @@ class Row:
 
     cells: Sequence[str]
 
-    def __str__(self) -> str:
+    def __str__(self):
         return f"| {' | '.join(self.cells)} |"
 
 
-def rows_of(paths: Sequence[Path], drive: str = "") -> Iterator[Row]:
+def rows_of(paths, drive=""):
     """Yield the rows of all models with loops, and of those that are refused.
 
     Args:
@@ -77,7 +73,7 @@ def rows_of(paths: Sequence[Path], drive: str = "") -> Iterator[Row]:
             yield Row((name, *found))
 
 
-def _has_loops(file: Path) -> bool:
+def _has_loops(file):
     if file.suffix == ".urdf":
         return file.with_suffix(".yaml").exists()
     text = _text(file, file.parent)
@@ -87,7 +83,7 @@ def _has_loops(file: Path) -> bool:
     )
 
 
-def _text(file: Path, folder: Path) -> str:
+def _text(file, folder):
     """Return the text of a model and of the files that it includes from its folder."""
     text = file.read_text(errors="replace")
     included = re.findall(r'<include\s+file\s*=\s*"([^"]+)"', text)
@@ -95,7 +91,7 @@ def _text(file: Path, folder: Path) -> str:
     return "".join([text, *(_text(each, folder) for each in files if each != file)])
 
 
-def compared(file: Path, drive: str = "") -> Sequence[str]:
+def compared(file, drive=""):
     """Return the cells of a model: its size, and the largest differences.
 
     Raises:
@@ -119,7 +115,7 @@ def compared(file: Path, drive: str = "") -> Sequence[str]:
     )
 
 
-def _freedoms(file: Path, drive: str) -> tuple[int, str]:
+def _freedoms(file, drive):
     """Return the freedom of a model and its first actuated joint, which the message names."""
     try:
         case = load(file)  # by its own motors and limits
@@ -132,13 +128,13 @@ def _freedoms(file: Path, drive: str) -> tuple[int, str]:
         raise
 
 
-def posed(file: Path, supplied: Supplied) -> tuple[Case, Driving, Assembled]:
+def posed(file, supplied):
     """Return the case of a model, its driven and held joints, and its start."""
     assembled, driving, _ = trees.model_of(read_tree(file), supplied)
     return load(file, supplied), driving, assembled
 
 
-def differences(file: Path, supplied: Supplied) -> tuple[int, int, np.ndarray]:
+def differences(file, supplied):
     """Return the number of samples that are solved, of those that the oracle reaches too, and the
     largest differences there [m, rad] with the oracle's residual.
     """
@@ -190,7 +186,7 @@ def _oracle(file, assembled, driving):
     return PinocchioNewton(file, assembled, driving.fixed)
 
 
-def main(arguments: Sequence[str]) -> int:
+def main(arguments):
     """Print the table."""
     parser = argparse.ArgumentParser(
         prog="python -m tests.oracles.public_robots",

@@ -6,7 +6,6 @@ rotation matrix and from differences of poses over steps so small that only digi
 fortieth know of them. The file's CSV was made with `rows`.
 """
 
-from collections.abc import Iterator
 from functools import cache
 
 from mpmath import mp, mpf
@@ -86,7 +85,7 @@ def level_with(k):
     ]
 
 
-def attitudes(stroke) -> dict:
+def attitudes(stroke):
     """Outputs of the pose alone; x of the frame is rearward, y outboard."""
     k = pose(stroke)
     s, contact, center = k.turn([0, 1, 0]), level_with(k), k.place(W)
@@ -111,7 +110,7 @@ def attitudes(stroke) -> dict:
     }
 
 
-def ratios(stroke) -> dict:
+def ratios(stroke):
     """Outputs of the way the knuckle goes."""
     here, before, after = (pose(stroke + step) for step in (0, -STEP, STEP))
     contact = level_with(here)
@@ -131,7 +130,7 @@ def ratios(stroke) -> dict:
     }
 
 
-def rows(strokes) -> Iterator[dict]:
+def rows(strokes):
     """Value and derivatives by the stroke of every output, under the names that columns of a
     reference have.
     """

@@ -11,8 +11,9 @@ import zlib
 from contextlib import redirect_stdout
 
 import pytest
+from kincheck import Results
 from kincheck.core.cli.main import main
-from kincheck.core.harness.record import Results, from_json
+from kincheck.core.harness.record import from_json
 from kincheck.core.report import curves
 from kincheck.core.report.report import write_report
 

@@ -6,16 +6,9 @@ import html
 
 import msgspec
 import pytest
-from kincheck.core.harness.record import Explanation, Outcome, Suspect
-from kincheck.core.history.findings import (
-    Change,
-    Finding,
-    Kind,
-    Loose,
-    Regressions,
-    RunName,
-    Step,
-)
+from kincheck import Outcome
+from kincheck.core.harness.record import Explanation, Suspect
+from kincheck.core.history.findings import Change, Finding, Kind, Loose, Regressions, RunName, Step
 from kincheck.core.report import junit, regressions, report, table
 
 from ..support.planted import as_json, missing, on_terminal, text_of_page, unexplained, unfilled

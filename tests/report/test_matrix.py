@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-from kincheck.core.harness.record import Results
-from kincheck.core.joints import Coupler, Joint
+from kincheck import Joint, Results
+from kincheck.core.joints import Coupler
 from kincheck.core.report.table import print_matrix
 
 from ..support.fakes import Fake, crank, off, raising

@@ -10,7 +10,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from kincheck.core.harness.record import Results
+from kincheck import Results
 from kincheck.core.report import sections
 from kincheck.core.report.report import headline
 from kincheck.core.report.sections import split_message

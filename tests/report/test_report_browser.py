@@ -11,8 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core.harness.record import Outcome, Results
+from kincheck import Outcome, Results, cases
 from kincheck.core.harness.scene import scene
 from kincheck.core.report.figures import Effort, Past
 from kincheck.core.report.report import write_report
@@ -43,9 +42,7 @@ def several():
     return Results(run={"cases": {"good": {"source": "a yellow book"}}}, records=records)
 
 
-def test_overview_filters_in_browser(
-    visit,
-):
+def test_overview_filters_in_browser(visit):
     told = visit(
         several(),
         """
@@ -223,10 +220,7 @@ def test_trends_are_drawn_in_browser(visit):
 
 def test_hostile_text_in_browser(visit):
     shown = scene(cases.load("mcpherson_strut"))
-    joints = [
-        replaced(shown.joints[0], name=HOSTILE, type=HOSTILE),
-        *shown.joints[1:],
-    ]
+    joints = [replaced(shown.joints[0], name=HOSTILE, type=HOSTILE), *shown.joints[1:]]
     run = results(case=HOSTILE)
     strange = replaced(run.records[1], engine=HOSTILE, message=HOSTILE, version=HOSTILE)
     run = replaced(

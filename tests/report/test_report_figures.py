@@ -6,8 +6,9 @@ import math
 import re
 
 import pytest
+from kincheck import Outcome, Results
 from kincheck.core.harness.labels import number
-from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
+from kincheck.core.harness.record import Deviation, Deviations
 from kincheck.core.report.axis import SAMPLES
 from kincheck.core.report.figures import SYMBOLS, Past
 from kincheck.core.report.report import write_report
@@ -120,10 +121,7 @@ def test_figures_without_reference_show_differences(tmp_path):
         name: judged(one.outputs[name], native.outputs[name], 1e-9, "native")
         for name in one.outputs
     }
-    page = report(
-        Results(run=run.run, records=[native, replace(one, errors=output)]),
-        tmp_path,
-    )
+    page = report(Results(run=run.run, records=[native, replace(one, errors=output)]), tmp_path)
     assert traces(page, "case-0-0", "reference", "lines") == []
     assert traces(page, "case-0-0-position", "native", "lines+markers") == []
     [curve] = traces(page, "case-0-0-position", "one", "lines+markers")
@@ -161,6 +159,16 @@ def test_zero_errors_have_floor(tmp_path):
     assert 0 in errors
     assert 0 < figure["layout"]["meta"]["floor"] < min(e for e in errors if e)
     assert figure["layout"]["yaxis"]["ticktext"][0] == "exactly 0"
+
+
+@pytest.mark.parametrize(("tolerance", "floor"), [(2e-3, 1e-10), (0.0, 1e-16)])
+def test_exact_agreement_has_floor(tolerance, floor, tmp_path):
+    run = results()
+    found = series(GRID)
+    errors = {"half_track_change": judged(found, found, tolerance, "closed_form")}
+    exact = replace(run.records[0], outputs={"half_track_change": found}, errors=errors)
+    figure = report(replace(run, records=[exact]), tmp_path).data["figures"]["case-0-0-position"]
+    assert figure["layout"]["meta"]["floor"] == pytest.approx(floor, abs=0.0)
 
 
 def test_long_series_are_thinned(tmp_path):

@@ -11,10 +11,21 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, solve
-from kincheck.core.case.case import MARKER, Case, Sweep, Truth
-from kincheck.core.harness.record import Outcome, Results, from_json, to_json
+from kincheck import (
+    Body,
+    Case,
+    Distance,
+    JointAngle,
+    Mechanism,
+    Outcome,
+    Point,
+    Results,
+    Revolute,
+    cases,
+    solve,
+)
+from kincheck.core.case.case import MARKER, Sweep, Truth
+from kincheck.core.harness.record import from_json, to_json
 from kincheck.core.harness.scene import FRAMES, scene, with_scenes
 from kincheck.core.harness.scene_record import Scene, SceneBody
 from kincheck.core.report.axis import driver_axis

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from .fakes import Fake, solution
 
 
-def _drake() -> None:
+def _drake():
     """Break a check of Drake: three positions for a plant that has none."""
     plants: Any = importlib.import_module("pydrake.multibody.plant")
     plant = plants.MultibodyPlant(0.0)
@@ -18,7 +18,7 @@ def _drake() -> None:
     plant.SetPositions(plant.CreateDefaultContext(), [0.0, 0.0, 0.0])
 
 
-def _simbody() -> None:
+def _simbody():
     """Give OpenSim a name that it refuses, too late: the process ends."""
     o: Any = importlib.import_module("opensim")
     model = o.Model()
@@ -34,17 +34,14 @@ class GivingUp(Fake):
         deed: how.
     """
 
-    deeds: ClassVar[dict[str, Callable[[], object]]] = {
-        "drake": _drake,
-        "simbody": _simbody,
-    }
+    deeds: ClassVar[dict[str, Callable[[], object]]] = {"drake": _drake, "simbody": _simbody}
     deed: str = "drake"
 
-    def __init__(self, deed: str) -> None:
+    def __init__(self, deed):
         super().__init__("giving_up")
         self.deed = deed
 
-    def solve(self, model: Any, case: Any, tol: float) -> Any:
+    def solve(self, model, case, tol):
         if case.name == "gives_up":
             self.deeds[self.deed]()
         return solution(case)

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
-from kincheck.core.joints import (
+from kincheck import (
     Cylindrical,
     Distance,
     Revolute,

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Inline, JointAngle, Mechanism, Point, Revolute, Spherical
+from kincheck import Body, Inline, JointAngle, Mechanism, Point, Revolute, Spherical
 from kincheck.core.kinematics import Method, NativeSolver
 
 

@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Thread
@@ -40,7 +39,7 @@ HELPERS = """
 
 
 @contextmanager
-def chromium(folder: Path) -> Iterator[str]:
+def chromium(folder):
     """Run a headless Chromium with its profile in a folder; yields where it listens."""
     command = [str(CHROMIUM), *FLAGS, "--remote-debugging-port=0", f"--user-data-dir={folder}"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
@@ -63,7 +62,7 @@ class Browser:
     key events, by the Chrome DevTools Protocol (https://chromedevtools.github.io/devtools-protocol/).
     """
 
-    def __init__(self, host: str):
+    def __init__(self, host):
         with urlopen(f"http://{host}/json/version") as told:
             address = json.load(told)["webSocketDebuggerUrl"]
         self.count, self.events = 0, list[dict[str, Any]]()
@@ -79,7 +78,7 @@ class Browser:
         scheme = {"name": "prefers-color-scheme", "value": "light"}
         self("Emulation.setEmulatedMedia", features=[scheme])
 
-    def __call__(self, method: str, **given: Any) -> dict[str, Any]:
+    def __call__(self, method, **given):
         """Call a method of the protocol."""
         self.count += 1
         self.socket.send(json.dumps({"id": self.count, "method": method, "params": given}))
@@ -90,7 +89,7 @@ class Browser:
                 return message["result"]
             self.events.append(message)
 
-    def resize(self, width: int, height: int) -> None:
+    def resize(self, width, height):
         """Change the size of the window [px]."""
         self(
             "Emulation.setDeviceMetricsOverride",
@@ -100,7 +99,7 @@ class Browser:
             mobile=False,
         )
 
-    def violations(self) -> list[list[str]]:
+    def violations(self):
         """Return what axe finds on the page."""
         self("Runtime.evaluate", expression=AXE.read_text("utf-8"))
         return self.run(
@@ -108,32 +107,32 @@ class Browser:
             "return violations.map(({ id, nodes }) => [id, ...nodes.map(({ html }) => html)]);"
         )
 
-    def run(self, script: str) -> Any:
+    def run(self, script):
         """Return what a script returns in the page; it may use the helpers."""
         text = f"(async () => {{ {HELPERS} {script} }})()"
         found = self("Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 
-    def visit(self, address: str) -> None:
+    def visit(self, address):
         """Open a page and wait until it is ready."""
         self("Page.navigate", url=address)
         self.until("'ready' in document.documentElement.dataset")
 
-    def reload(self) -> None:
+    def reload(self):
         """Load the page again and wait until it is ready; the old one is ready, too."""
         self.run("window.isOld = true")
         self("Page.reload")
         self.until("!window.isOld && 'ready' in document.documentElement.dataset")
 
-    def until(self, condition: str, seconds: float = 90.0) -> None:
+    def until(self, condition, seconds=90.0):
         """Wait for a condition in the page."""
         end = monotonic() + seconds
         while not self.run(f"return Boolean(document.documentElement && ({condition}))"):
             assert monotonic() < end, condition
             sleep(0.05)
 
-    def mouse(self, kind: str, x: float, y: float, buttons: int) -> None:
+    def mouse(self, kind, x, y, buttons):
         """Send one event of the mouse with the left button."""
         button = "left" if buttons or kind != "mouseMoved" else "none"
         self(
@@ -146,7 +145,7 @@ class Browser:
             clickCount=1,
         )
 
-    def drag(self, start: tuple[float, float], by: tuple[float, float], steps: int = 12) -> None:
+    def drag(self, start, by, steps=12):
         """Press at a place, move, and release."""
         (x, y), (dx, dy) = start, by
         self.mouse("mouseMoved", x, y, 0)
@@ -155,7 +154,7 @@ class Browser:
             self.mouse("mouseMoved", x + dx * k / steps, y + dy * k / steps, 1)
         self.mouse("mouseReleased", x + dx, y + dy, 0)
 
-    def middle(self, selector: str) -> tuple[float, float]:
+    def middle(self, selector):
         """Return the middle of an element, scrolled into view [px]."""
         x, y = self.run(
             f"const it = document.querySelector({json.dumps(selector)});"
@@ -165,11 +164,11 @@ class Browser:
         )
         return x, y
 
-    def click(self, selector: str) -> None:
+    def click(self, selector):
         """Click on an element."""
         self.drag(self.middle(selector), (0.0, 0.0), steps=0)
 
-    def key(self, key: str, *, ctrl: bool = False, shift: bool = False, alt: bool = False) -> None:
+    def key(self, key, *, ctrl=False, shift=False, alt=False):
         """Press and release a key."""
         codes = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
         codes |= {"Enter": 13, "Tab": 9, "Escape": 27}
@@ -186,22 +185,22 @@ class Browser:
                 modifiers=modifiers,
             )
 
-    def write(self, text: str) -> None:
+    def write(self, text):
         """Type a text where the focus is, in place of what is selected."""
         self("Input.insertText", text=text)
 
-    def picture(self, file: Path) -> None:
+    def picture(self, file):
         """Write the page as PNG."""
         data = self("Page.captureScreenshot", format="png", captureBeyondViewport=True)["data"]
         file.write_bytes(base64.b64decode(data))
 
-    def complaints(self) -> list[str]:
+    def complaints(self):
         """Return what was written to the console or thrown."""
         self.run("return 0")
         named = ("Runtime.exceptionThrown", "Log.entryAdded", "Runtime.consoleAPICalled")
         return [json.dumps(each) for each in self.events if each.get("method") in named]
 
-    def close(self) -> None:
+    def close(self):
         """Close the page and forget its data."""
         self.socket = self.whole
         self("Target.disposeBrowserContext", browserContextId=self.context)

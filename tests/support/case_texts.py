@@ -4,11 +4,11 @@ import re
 from functools import partial
 
 import pytest
+from kincheck import CaseError, Supplied
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.lists import schema_of
-from kincheck.core.errors import CaseError, OpenError
+from kincheck.core.errors import OpenError
 
 BASE = """
 schema = "kincheck-case/1"

@@ -5,14 +5,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from kincheck.core import primitives as p
-from kincheck.core.algebra import ZERO, vec
-from kincheck.core.joints import (
-    Coupler,
+from kincheck import (
+    GROUND,
+    Body,
     Cylindrical,
-    Follower,
     Gear,
     Joint,
+    JointAngle,
+    JointDisplacement,
+    Mechanism,
+    Point,
+    PointCoordinate,
     Polynomial,
     RackPinion,
     Revolute,
@@ -20,16 +23,11 @@ from kincheck.core.joints import (
     Spline,
     Translational,
 )
+from kincheck.core import primitives as p
+from kincheck.core.algebra import ZERO, vec
+from kincheck.core.joints import Coupler, Follower
 from kincheck.core.joints.base import unit
-from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
-from kincheck.core.mechanism.motions import (
-    JointAngle,
-    JointDisplacement,
-    Motion,
-    Path,
-    PointCoordinate,
-)
+from kincheck.core.mechanism.motions import Motion, Path
 
 from ..oracles import free_bodies
 from .loads import random_inertia

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import kincheck.adapters
 import numpy as np
+from kincheck import JointAngle, JointDisplacement, Sine, Trajectory
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
-from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Sine
-from kincheck.core.trajectory import QUANTITIES, Trajectory
+from kincheck.core.trajectory import QUANTITIES
 
 
 @dataclass
@@ -421,10 +421,7 @@ HARMLESS = {
         "an engine may give positions alone; the rows of rates are skipped",
     ),
     "residual zero": (part(residual=lambda x: 0.0), "no outsider knows the residual"),
-    "more iterations": (
-        part(iterations=lambda x: 2 * x),
-        "nor how many iterations it took",
-    ),
+    "more iterations": (part(iterations=lambda x: 2 * x), "nor how many iterations it took"),
     "another rank": (
         answer(lambda x, case: changed(x, details={**x.details, "rank": 1})),
         "the rank is that of the engine's own rows, which differ",
@@ -433,10 +430,7 @@ HARMLESS = {
         forces(power=lambda x: 0.0 * x),
         "the power is zero but for round-off, with right efforts",
     ),
-    "parameters of the other sign": (
-        bodies(p=lambda x: -x),
-        "they mean the same attitude",
-    ),
+    "parameters of the other sign": (bodies(p=lambda x: -x), "they mean the same attitude"),
 }
 
 KNOWN = {

@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck import Case
+from kincheck.core.case.case import Sweep, Truth
 from kincheck.core.case.measures import Axis, DriverEffort, ElementForce, JointForce, JointMoment
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper

@@ -9,11 +9,22 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from kincheck import adapters
-from kincheck.core import Body, JointAngle, Mechanism, Point
-from kincheck.core import solve as solve_natively
-from kincheck.core.case.case import TIME, Case, Output, Sweep, Truth
-from kincheck.core.joints import Distance, Fixed, Revolute, Spherical, Translational, Universal
+from kincheck import (
+    Body,
+    Case,
+    Distance,
+    Fixed,
+    JointAngle,
+    Mechanism,
+    Point,
+    Revolute,
+    Spherical,
+    Translational,
+    Universal,
+    adapters,
+)
+from kincheck import solve as solve_natively
+from kincheck.core.case.case import TIME, Output, Sweep, Truth
 from kincheck.core.mechanism.tree import SpanningTree, spanning_tree
 
 from .joint_loops import TYPES
@@ -131,10 +142,7 @@ def assert_as_native(engine, mechanism, values, rate=1.0, cut=(), **more):
 def assert_consistent(motion, dt):
     """Velocity and acceleration against eighth-order differences over uniform samples."""
     weights, n = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280]), len(motion.position)
-    for x, rates in (
-        (motion.position, motion.velocity),
-        (motion.velocity, motion.acceleration),
-    ):
+    for x, rates in ((motion.position, motion.velocity), (motion.velocity, motion.acceleration)):
         pairs = ((w, x[4 + k : n - 4 + k], x[4 - k : n - 4 - k]) for k, w in enumerate(weights, 1))
         found = sum(w * (after - before) for w, after, before in pairs) / dt
         # differences: round-off 1e-16 / dt of values about 1, times the mechanism's amplification

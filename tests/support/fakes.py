@@ -4,13 +4,19 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from kincheck import adapters
-from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
+from kincheck import (
+    Body,
+    Case,
+    JointAngle,
+    Mechanism,
+    Point,
+    PointMotion,
+    Revolute,
+    Trajectory,
+    adapters,
+)
+from kincheck.core.case.case import Output, Series, Sweep, Truth
 from kincheck.core.harness.run import run
-from kincheck.core.joints import Revolute
-from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
-from kincheck.core.mechanism.motions import JointAngle
-from kincheck.core.trajectory import PointMotion, Trajectory
 
 RADIUS = 0.5
 SAMPLES = 9

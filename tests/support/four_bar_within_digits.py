@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kincheck import solve
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.kinematics import solve
 
 HINGES = {"a": (0.0, 0.0, 0.0), "b": (0.0, 0.0, 0.3), "c": (0.5, 0.0, 0.5), "d": (0.6, 0.0, 0.0)}
 BODIES = {"a": ("ground", "crank"), "b": ("crank", "coupler"), "c": ("coupler", "rocker")}

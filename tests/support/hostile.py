@@ -18,7 +18,7 @@ seconds, memory, forbidden = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
 opened: list[str] = []
 
 
-def watch(event: str, details: tuple[object, ...]) -> None:
+def watch(event, details):
     """Remember what is opened where nothing may be."""
     if event == "open" and isinstance(details[0], str | bytes):
         name = details[0] if isinstance(details[0], str) else details[0].decode(errors="replace")

@@ -13,12 +13,12 @@ from .case_texts import BASE, BY_FILE, edited
 LARGEST = case_file.LARGEST_FILE
 
 
-def filled(repeated: str, around: str = "{}", size: int = LARGEST // 10) -> str:
+def filled(repeated, around="{}", size=LARGEST // 10):
     """A text of a tenth of the largest size, at which what is quadratic takes minutes too."""
     return around.replace("{}", repeated * ((size - len(around)) // len(repeated)))
 
 
-def archives(*ends: str) -> dict[str, tuple[str, str | bytes, str]]:
+def archives(*ends):
     """A zip archive under other names."""
     with zipfile.ZipFile(packed := BytesIO(), "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("case.toml", "0" * 1_000_000)
@@ -142,5 +142,5 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
 }
 
 
-def proved(text: str) -> str:
+def proved(text):
     return json.dumps(PROVED).replace('"1.5"', f'"{text}"')

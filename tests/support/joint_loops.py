@@ -3,19 +3,8 @@
 from functools import cache
 
 import numpy as np
-from kincheck.core import (
-    GROUND,
-    Body,
-    Distance,
-    Joint,
-    JointAngle,
-    Mechanism,
-    Point,
-    Revolute,
-    solve,
-)
+from kincheck import GROUND, Body, Distance, Joint, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core import joints as library
-from kincheck.core.trajectory import Trajectory
 
 HINGE = (0.2, -0.1, 0.3)
 CRANK = Revolute("crank", GROUND, "A", (0.0, 0.1, -0.1), (0.3, -0.2, 2.0))
@@ -79,7 +68,7 @@ TOO_LOOSE = {
 """Types of fewer than three rows, which carry no body."""
 
 
-def on_crank(kind: str, first: str, second: str) -> Mechanism:
+def on_crank(kind, first, second):
     """Body B on the crank A by one joint of that kind, its freedoms taken by rods to the ground."""
     assert kind in GEOMETRY, f"joint type {kind!r} is not tested: add it to GEOMETRY here"
     joint = Joint.registry[kind]("tested", first, second, **GEOMETRY[kind])
@@ -109,16 +98,14 @@ ROUND_OFF = (1e-13, 1e-12, 1e-11)
 
 
 @cache
-def native_motion(kind: str, first: str, second: str) -> Trajectory:
+def native_motion(kind, first, second):
     """The motion of `on_crank` by the native engine, computed once for all simulators."""
     found = solve(on_crank(kind, first, second), "turn", TURN, rate=RATE)
     assert found.solved.all()
     return found
 
 
-def assert_moves_natively(
-    found: Trajectory, kind: str, bodies: tuple[str, str], tolerances=ROUND_OFF
-) -> None:
+def assert_moves_natively(found, kind, bodies, tolerances=ROUND_OFF):
     """The points of `on_crank` move, and as by the native engine [m, m/s, m/s^2]."""
     native = native_motion(kind, *bodies)
     for name, motion in found.points.items():

@@ -2,7 +2,6 @@
 
 import ast
 import copy
-from collections.abc import Iterator
 
 SWAPPED = {"i": "j", "j": "i", "vi": "vj", "vj": "vi", "f": "g", "g": "h", "h": "f"}
 """Names of bodies, twists and axes, and what is taken instead."""
@@ -24,7 +23,7 @@ OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add}
 CHANGED = ast.BinOp | ast.UnaryOp | ast.Name | ast.Attribute | ast.Constant | ast.Call | ast.Tuple
 
 
-def mutants(source: str) -> Iterator[tuple[str, str]]:
+def mutants(source):
     """Yield the place with the change, and the source of every mutant."""
     methods = [
         (f"{owner.name}.{each.name}", each)
@@ -57,7 +56,7 @@ def mutants(source: str) -> Iterator[tuple[str, str]]:
                 yield where, _with_function(source, function, text)
 
 
-def _changes(node: ast.AST) -> Iterator[ast.expr]:
+def _changes(node):
     """Yield what stands in the place of a node."""
     match node:
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
@@ -87,14 +86,14 @@ def _changes(node: ast.AST) -> Iterator[ast.expr]:
 
 
 class _Replacing(ast.NodeTransformer):
-    def __init__(self, node: ast.AST, new: ast.expr) -> None:
+    def __init__(self, node, new):
         self.node, self.new = node, new
 
-    def visit(self, node: ast.AST) -> ast.AST:
+    def visit(self, node):
         return self.new if node is self.node else super().generic_visit(node)
 
 
-def _with_function(source: str, function: ast.FunctionDef, text: str) -> str:
+def _with_function(source, function, text):
     """Return the source with the body of a function replaced."""
     lines = source.splitlines()
     first = min([function.lineno, *(each.lineno for each in function.decorator_list)]) - 1

@@ -1,19 +1,26 @@
 """A mechanism with every kind of load: a crank and slider beside the origin."""
 
 import numpy as np
-from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck import (
+    Body,
+    Case,
+    Distance,
+    JointAngle,
+    Mechanism,
+    Point,
+    PointCoordinate,
+    Revolute,
+    Translational,
+)
+from kincheck.core.case.case import Sweep, Truth
 from kincheck.core.case.io.outputs import with_all_coordinates
-from kincheck.core.joints import Distance, Revolute, Translational
-from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
-from kincheck.core.mechanism.mechanism import Mechanism, Point
-from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 
 INERTIA = (0.5, 0.75, 1.0, 0.0625, -0.03125, 0.125)
 GRAVITY = (0.5, 0.0, -9.75)
 
 
-def loaded(driver=None) -> Mechanism:
+def loaded(driver=None):
     """Return a slider-crank in space with masses, gravity and four force elements; all numbers are
     exact in binary.
     """
@@ -47,12 +54,12 @@ def loaded(driver=None) -> Mechanism:
     )
 
 
-def pushed() -> Mechanism:
+def pushed():
     """Return the same, driven at its tip."""
     return loaded(PointCoordinate("push_tip", "tip", (1.0, 0.0, 0.0)))
 
 
-def case_of(mechanism: Mechanism) -> Case:
+def case_of(mechanism):
     """A case of a mechanism with all coordinates, at three samples of its first driver."""
     sweep = Sweep(mechanism.drivers[0].name, np.linspace(0.0, 0.25, 3))
     return with_all_coordinates(

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
+from kincheck import JointAngle, PointCoordinate
 from kincheck.core.kinematics import Method, NativeSolver, with_forces
-from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 
 from ..oracles import newton_euler
 

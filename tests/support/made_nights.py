@@ -7,7 +7,8 @@ import random
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
-from kincheck.core.harness.record import Outcome, Seconds
+from kincheck import Outcome
+from kincheck.core.harness.record import Seconds
 from kincheck.core.history.findings import Kind
 from msgspec.structs import replace
 

@@ -3,18 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
-from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.joints import Cylindrical, Fixed, Revolute
-from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
-from kincheck.core.mechanism.motions import JointAngle as AngleDriver
-from kincheck.core.mechanism.motions import JointDisplacement as DisplacementDriver
-from kincheck.core.mechanism.motions import Ramp
+from kincheck import Body, Case, Cylindrical, Fixed, Mechanism, Point, Ramp, Revolute
+from kincheck import JointAngle as AngleDriver
+from kincheck import JointDisplacement as DisplacementDriver
+from kincheck.core.case.case import Sweep, Truth
 
 AXIS = (1.0, 2.0, 2.0)
 RATE = 2.0
 
 
-def arm(values, **more) -> Case:
+def arm(values, **more):
     """A disc that turns about an oblique axis, and a slide that moves along it on the disc."""
     mechanism = Mechanism(
         "arm",

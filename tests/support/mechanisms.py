@@ -3,8 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from kincheck.cases.jet import constant, cos, sin, sqrt, steady
-from kincheck.core import (
+from kincheck import (
     Body,
     Distance,
     Gear,
@@ -22,6 +21,7 @@ from kincheck.core import (
     Universal,
     solve,
 )
+from kincheck.cases.jet import constant, cos, sin, sqrt, steady
 from kincheck.core.joints import Kind
 
 ORIGIN, X, Y, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

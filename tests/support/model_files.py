@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from kincheck.core.case.io.reader_options import Supplied
+from kincheck import Supplied
 
 from .case_texts import write
 

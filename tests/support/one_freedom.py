@@ -269,9 +269,7 @@ SUBJECTS = {
         of_bushing(4.0, cardan=True),
     ),
     "bushing with stop": element(
-        "bushing",
-        {**RUBBER, "curve": [[], [], TABLE]},
-        of_bushing(curve=STOPPED),
+        "bushing", {**RUBBER, "curve": [[], [], TABLE]}, of_bushing(curve=STOPPED)
     ),
 }
 

@@ -79,12 +79,7 @@ def _screws(name, transforms):
 def _dh(theta, d, a, alpha):
     (c, s), (ca, sa) = ((np.cos(x), np.sin(x)) for x in (theta, alpha))
     return np.array(
-        [
-            [c, -s * ca, s * sa, a * c],
-            [s, c * ca, -c * sa, a * s],
-            [0, sa, ca, d],
-            [0, 0, 0, 1],
-        ]
+        [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]
     )
 
 

@@ -16,7 +16,7 @@ import math
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -36,9 +36,7 @@ Path = tuple[Any, ...]
 Forms = Mapping[str, Callable[[Any], str]]
 
 
-def missing(
-    result: Any, forms: Forms, ours: Sequence[str] = (), of: str = ".*"
-) -> dict[str, list[str]]:
+def missing(result, forms, ours=(), of=".*"):
     """Return the forms that do not say something, by its place in the result.
 
     Args:
@@ -63,7 +61,7 @@ def missing(
     return found
 
 
-def unfilled(result: Any) -> set[str]:
+def unfilled(result):
     """Return the fields of a result that are empty in all of its parts, by their class."""
     named, filled, waiting = set[str](), set[str](), [result]
     while waiting:
@@ -81,14 +79,14 @@ def unfilled(result: Any) -> set[str]:
     return named - filled
 
 
-def text_of_page(page: str) -> str:
+def text_of_page(page):
     """Return a page as text, with the packed data of its figures."""
     packed = re.findall(r">([A-Za-z0-9+/=]{200,})<", page)
     data = [zlib.decompress(base64.b64decode(each)).decode() for each in packed]
     return "\n".join([html.unescape(page), *data])
 
 
-def _places(result: Any, ours: Sequence[str]) -> dict[str, tuple[Path, Any]]:
+def _places(result, ours):
     """Return the first word or number of each place: without the places in lists, records apart."""
     found: dict[str, tuple[Path, Any]] = {}
     for path, names, value in _leaves(result):
@@ -97,7 +95,7 @@ def _places(result: Any, ours: Sequence[str]) -> dict[str, tuple[Path, Any]]:
     return found
 
 
-def _leaves(value: Any, path: Path = (), names: Path = ()) -> Iterator[tuple[Path, Path, Any]]:
+def _leaves(value, path=(), names=()):
     if value is None or isinstance(value, enum.Enum | bool):
         return
     if isinstance(value, str | int | float):
@@ -110,7 +108,7 @@ def _leaves(value: Any, path: Path = (), names: Path = ()) -> Iterator[tuple[Pat
         yield from _leaves(each, (*path, key), (*names, *said))
 
 
-def _parts(value: Any) -> dict[Any, Any]:
+def _parts(value):
     if isinstance(value, msgspec.Struct):
         return msgspec.structs.asdict(value)
     if dataclasses.is_dataclass(value):
@@ -122,12 +120,12 @@ def _parts(value: Any) -> dict[Any, Any]:
     return dict(enumerate(value)) if isinstance(value, Sequence) else {}
 
 
-def _other(value: float) -> float:
+def _other(value):
     new = type(value)(TIMES * value)
     return new + 1 if new == value else new
 
 
-def _changed(value: Any, path: Path, new: Any) -> Any:
+def _changed(value, path, new):
     """Return a copy with one part changed."""
     if not path:
         return new
@@ -148,12 +146,12 @@ def _changed(value: Any, path: Path, new: Any) -> Any:
     return type(value)([*value[:key], new, *value[key + 1 :]])
 
 
-def _appears(value: float, text: str, before: Counter[str]) -> bool:
+def _appears(value, text, before):
     fresh = Counter(NUMBER.findall(text)) - before
     return any(_rounds(size * value, each) for each in fresh for size in UNITS)
 
 
-def _rounds(value: float, text: str) -> bool:
+def _rounds(value, text):
     """Return whether a text is a number rounded to its digits, of either sign."""
     digits, _, exponent = text.lower().partition("e")
     last = 10.0 ** (int(exponent or 0) - len(digits.partition(".")[2]))

@@ -4,10 +4,9 @@ import io
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
 
 
-def assert_printed(text: str, value: float | int | str | None) -> None:
+def assert_printed(text, value):
     """A text is a word, a count, a dash for what is unknown, or a number of three digits, from
     1,000 up to 100,000 of as many as there are before the point.
     """
@@ -24,14 +23,14 @@ def assert_printed(text: str, value: float | int | str | None) -> None:
         assert abs(float(text) - value) <= 0.5001 * unit, f"{text} for {value}"
 
 
-def assert_row(cells: Sequence[str], values: Sequence[float | int | str | None]) -> None:
+def assert_row(cells, values):
     """The cells of a row in their order."""
     assert len(cells) == len(values), cells
     for text, value in zip(cells, values, strict=True):
         assert_printed(text, value)
 
 
-def blocks(text: str, indent: str = "") -> list[tuple[str, str]]:
+def blocks(text, indent=""):
     """Return the rows of tables on a narrow terminal: their first cells, and the other cells, each
     after its head.
     """
@@ -39,7 +38,7 @@ def blocks(text: str, indent: str = "") -> list[tuple[str, str]]:
     return [(title.strip(), " ".join(cells.split())) for title, cells in found]
 
 
-def cells_of(block: str, heads: Sequence[str]) -> list[str]:
+def cells_of(block, heads):
     """Return the cells of a row by the heads in their order."""
     found = re.fullmatch(" ".join(f"{re.escape(head)} (.+)" for head in heads), block)
     assert found, f"{block}: expected {', '.join(heads)}"
@@ -53,7 +52,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def coloured(text: str) -> dict[str, list[str]]:
+def coloured(text):
     """Return what a terminal shows in red and in green, in its order."""
     return {
         colour: [each.strip() for each in re.findall(rf"\x1b\[{code}m(.*?)\x1b\[0m", text)]
@@ -61,7 +60,7 @@ def coloured(text: str) -> dict[str, list[str]]:
     }
 
 
-def junit_tests(text: bytes | str) -> dict[str, list[tuple[str, str]]]:
+def junit_tests(text):
     """Return the verdicts of the test cases of a JUnit file with messages, by class and name."""
     return {
         f"{test.get('classname')} {test.get('name')}": [
@@ -71,6 +70,6 @@ def junit_tests(text: bytes | str) -> dict[str, list[tuple[str, str]]]:
     }
 
 
-def junit_messages(text: bytes | str, kind: str) -> list[str]:
+def junit_messages(text, kind):
     """Return the messages of a kind in a JUnit file."""
     return [each.get("message", "") for each in ET.fromstring(text).iter(kind)]

@@ -52,7 +52,7 @@ class RandomRobot:
         return R.T @ (at - r), R.T @ (np.eye(3) if turn is None else turn)
 
 
-def random_robot(seed: int) -> RandomRobot:
+def random_robot(seed):
     """Return a planar robot with parallel hinges, or a spatial one with all kinds of joints."""
     rng = np.random.default_rng(seed)
     planar = bool(rng.random() < 0.4)

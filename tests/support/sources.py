@@ -1,7 +1,6 @@
 """The files of the repository, their syntax trees and their imports. Files are read, not run."""
 
 import ast
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -30,7 +29,7 @@ def tree(path):
     return ast.parse((ROOT / path).read_text(encoding="utf-8"))
 
 
-def statements(node: ast.AST) -> Iterator[ast.AST]:
+def statements(node):
     """Yield all statements below a node, however deep; expressions are not read."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.stmt | ast.excepthandler | ast.match_case):
@@ -39,14 +38,14 @@ def statements(node: ast.AST) -> Iterator[ast.AST]:
 
 
 @cache
-def imported(path: Path, syntax: ast.AST) -> list[tuple[str, ...]]:
+def imported(path, syntax):
     """Return the imports of a file as paths from the top; relative ones are resolved, and those of
     the package kincheck itself.
     """
     return [*_resolved(path, syntax)]
 
 
-def _resolved(path: Path, syntax: ast.AST) -> Iterator[tuple[str, ...]]:
+def _resolved(path, syntax):
     for target in _named(path, syntax):
         if path.parent != PACKAGE or target[0] != "kincheck":
             yield target
@@ -56,7 +55,7 @@ def _resolved(path: Path, syntax: ast.AST) -> Iterator[tuple[str, ...]]:
             yield (*PACKAGE.parts, *target[1:])
 
 
-def _named(path: Path, syntax: ast.AST) -> Iterator[tuple[str, ...]]:
+def _named(path, syntax):
     for node in statements(syntax):
         if isinstance(node, ast.Import):
             yield from (tuple(alias.name.split(".")) for alias in node.names)
@@ -74,12 +73,12 @@ MODULES = {
 }
 
 
-def module_of(target: tuple[str, ...]) -> Path | None:
+def module_of(target):
     """Return the file that an import loads, or None where it is not one of ours."""
     return MODULES.get(target) or MODULES.get(target[:-1])
 
 
-def folder_of(path: Path) -> str:
+def folder_of(path):
     """Return the folder of core that a file belongs to, as the table names it."""
     if path == Path("core/__init__.py"):
         return "__init__"
@@ -94,6 +93,6 @@ DELETED = "KINCHECK_DELETED"
 """Environment variable: extensions that tests may name though they have no folder."""
 
 
-def extension_of(path: Path) -> str | None:
+def extension_of(path):
     """Return the extension that a file belongs to; None for the kernel."""
     return next((folder.name for folder in path.parents if folder in EXTENSIONS), None)

@@ -12,7 +12,7 @@ from kincheck.core import primitives as p
 from kincheck.core.algebra import IDENTITY, ZERO, Quat, Vec3, cross
 from kincheck.core.doors import extensions
 from kincheck.core.jet import Jet
-from kincheck.core.primitives.base import Drive, Pose, Primitive, Twist
+from kincheck.core.primitives import Drive, Pose, Primitive, Twist
 
 
 def cos_sin(a):

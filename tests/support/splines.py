@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kincheck.core import Spline
+from kincheck import Spline
 
 
 def through(points):

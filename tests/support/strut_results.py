@@ -5,19 +5,10 @@ installed.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import msgspec
-from kincheck.core.harness.record import (
-    Deviation,
-    Deviations,
-    Evidence,
-    Outcome,
-    OutputSeries,
-    Record,
-    Results,
-    Seconds,
-)
+from kincheck import Outcome, Record, Results
+from kincheck.core.harness.record import Deviation, Deviations, Evidence, OutputSeries, Seconds
 
 STROKE = {
     "name": "stroke",
@@ -28,7 +19,7 @@ STROKE = {
 CRANK = {"name": "crank", "type": "joint_angle", "joint": "pivot"}
 
 
-def series(driver: list[float], error: float = 0.0) -> OutputSeries:
+def series(driver, error=0.0):
     position = [1e-3 * math.sin(20 * d) + error * (k % 3) for k, d in enumerate(driver)]
     velocity = [0.02 * math.cos(20 * d) - error * (k % 3) for k, d in enumerate(driver)]
     return OutputSeries(
@@ -40,12 +31,12 @@ def series(driver: list[float], error: float = 0.0) -> OutputSeries:
     )
 
 
-def distances(a: list[float], b: list[float]) -> list[float]:
+def distances(a, b):
     return [abs(x - y) for x, y in zip(a, b, strict=True)]
 
 
-def judged(found: OutputSeries, truth: OutputSeries, tolerance: float, against: str) -> Deviations:
-    def one(motion: str, tolerance: float) -> Deviation:
+def judged(found, truth, tolerance, against):
+    def one(motion, tolerance):
         errors = distances(getattr(found, motion), getattr(truth, motion))
         worst = max(errors)
         return Deviation(
@@ -65,9 +56,7 @@ def judged(found: OutputSeries, truth: OutputSeries, tolerance: float, against: 
     )
 
 
-def record(
-    case: str, truth: str, engine: str, error: float, grid: list[float], **changes: Any
-) -> Record:
+def record(case, truth, engine, error, grid, **changes):
     found, true = series(grid, error), series(grid)
     errors = {
         name: judged(found, true, 1e-9, truth) for name in ("half_track_change", "wheelbase_change")
@@ -115,9 +104,7 @@ ACCOUNT = {
 }
 
 
-def results(
-    truth: str = "in_house_oracle", case: str = "strut", driver: dict[str, Any] = STROKE
-) -> Results:
+def results(truth="in_house_oracle", case="strut", driver=STROKE):
     native = {"dof_account": ACCOUNT, "program": {"newton": {"operations": 7231, "flops": 6702}}}
     absent = {
         "outputs": {},

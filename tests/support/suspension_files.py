@@ -7,9 +7,8 @@ from copy import deepcopy
 from pathlib import Path
 
 import numpy as np
-from kincheck import cases
+from kincheck import Supplied, cases
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 

@@ -1,9 +1,8 @@
 """A four-bar in URDF, and its file."""
 
 import json
-from pathlib import Path
 
-from kincheck.core.case.io.reader_options import Supplied
+from kincheck import Supplied
 
 from ..extensions.trees.fuzz import urdf as seeds
 
@@ -13,7 +12,7 @@ LOOP = FOUR_BAR[FOUR_BAR.index("<constraint") : FOUR_BAR.index("</robot>")]
 TREE = FOUR_BAR.replace(LOOP, "")
 
 
-def robot(folder: Path, text: str, **beside: str) -> Path:
+def robot(folder, text, **beside):
     """Return the file of a robot, and write the files beside it."""
     file = folder / "robot.urdf"
     file.write_text(text)
@@ -30,7 +29,7 @@ COINCIDENT = {
 }
 
 
-def beside(folder: Path, **changes: object) -> Path:
+def beside(folder, **changes):
     """The four-bar, closed by a file beside it."""
     schema = changes.pop("schema", "kincheck-constraints/1")
     table = {"schema": schema, "constraints": [COINCIDENT | changes]}

@@ -1,16 +1,13 @@
 """A case, written as a case file and read back."""
 
-from pathlib import Path
-
 import numpy as np
-from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import case_text, load_case
 
 # The grid is computed once in the model's coordinates, and once from the design.
 GRID = 4.0 * np.finfo(float).eps
 
 
-def written_again(case: Case, folder: Path) -> Case:
+def written_again(case, folder):
     """Return the case that is read from what is written; it has the same parts."""
     file = folder / "written_again.toml"
     file.write_text(case_text(case), encoding="utf-8")

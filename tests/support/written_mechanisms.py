@@ -4,8 +4,9 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from kincheck.core import (
+from kincheck import (
     Body,
+    Case,
     Cylindrical,
     Distance,
     Gear,
@@ -19,7 +20,7 @@ from kincheck.core import (
     Translational,
     Universal,
 )
-from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck.core.case.case import Sweep, Truth
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.extensions.exports.model_writer import way_to
 

@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import solve
+from kincheck import Ramp, Sine, cases, solve
 from kincheck.core.extensions.laboratory.bench.size import LEAN, ring
-from kincheck.core.kinematics import Method, NativeSolver
+from kincheck.core.kinematics import Method, NativeSolver, start_of
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.routes import Route, start_of
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.singular_samples import scrutinise
 from kincheck.core.kinematics.continuation.walk import follow_samples
-from kincheck.core.mechanism.motions import Path, Ramp, Sine
+from kincheck.core.mechanism.motions import Path
 
 from ...support.block_structures import assert_alike, solve_as, torus, with_one_program
 from ...support.mechanisms import (

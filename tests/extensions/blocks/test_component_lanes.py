@@ -9,17 +9,19 @@ from pathlib import Path as File
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
     Gear,
     JointAngle,
     Mechanism,
     Point,
+    Ramp,
     Revolute,
+    Sine,
     SolveError,
     Spherical,
-    primitives,
 )
+from kincheck.core import primitives
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.extensions.blocks.component_lanes import LANES, ComponentLanes
 from kincheck.core.extensions.blocks.sweep import WORST
@@ -27,7 +29,7 @@ from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
 from kincheck.core.kinematics.continuation.walk import HALVINGS, part_of_step
-from kincheck.core.mechanism.motions import Path, Ramp, Sine
+from kincheck.core.mechanism.motions import Path
 from kincheck.core.program import MARGIN
 
 from ...support.block_structures import (
@@ -309,11 +311,7 @@ def test_singular_component_is_named():
         ]
         carrier = f"rocker{k}"
     mechanism = Mechanism(
-        "two loops",
-        bodies,
-        joints,
-        [Point("end", carrier, rest)],
-        [JointAngle("turn", "turn")],
+        "two loops", bodies, joints, [Point("end", carrier, rest)], [JointAngle("turn", "turn")]
     )
     for values in (np.linspace(0.0, 6.0, 31), [0.0, 3.0], [0.1, 2.0, 4.0]):
         found = solve_components(mechanism, Path({"turn": Ramp(1.0)}, np.array(values)), ("end",))

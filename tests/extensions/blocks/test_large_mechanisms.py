@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
     Distance,
     Gear,
@@ -16,6 +16,7 @@ from kincheck.core import (
     JointDisplacement,
     Mechanism,
     Point,
+    Ramp,
     Revolute,
     Screw,
     SolveError,
@@ -30,13 +31,12 @@ from kincheck.core.extensions.blocks.sparse_lu import Blocks
 from kincheck.core.extensions.blocks.sweep import Lanes
 from kincheck.core.extensions.designs.design_batch import solve_designs
 from kincheck.core.extensions.laboratory.bench.size import LEAN, circle, pivot, ring
+from kincheck.core.kinematics import Cartesian, placed
 from kincheck.core.kinematics.formulation.acceptance_criteria import least_slope
-from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.formulation.parameters import placed
 from kincheck.core.kinematics.formulation.state_vectors import jacobian
 from kincheck.core.kinematics.structure.degrees_of_freedom import NullSpaces
-from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.mechanism.motions import Path
 
 from ...support.block_structures import chain_of_hinges, solve_sparse
 from ...support.fakes import calls
@@ -414,10 +414,7 @@ def test_ring_counts_turns_between_samples(cranks, turns, count):
 
 @pytest.mark.parametrize(
     ("large", "kind"),
-    [
-        (chain(21), component_lanes.ComponentLanes),
-        (circle(22).mechanism, sparse_lanes.SparseLanes),
-    ],
+    [(chain(21), component_lanes.ComponentLanes), (circle(22).mechanism, sparse_lanes.SparseLanes)],
     ids=["components", "sparse"],
 )
 def test_cache_keeps_last_large_mechanism(large, kind, monkeypatch):

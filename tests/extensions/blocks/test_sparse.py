@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
     JointAngle,
     Mechanism,
+    Ramp,
     Revolute,
+    Sine,
     SolveError,
     Translational,
     solve,
@@ -24,24 +26,12 @@ from kincheck.core.kinematics import Method
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.motion_solver import ONE_PROGRAM
-from kincheck.core.mechanism.motions import Path, Ramp, Sine
+from kincheck.core.mechanism.motions import Path
 from scipy.sparse import linalg
 
-from ...support.block_structures import (
-    assert_alike,
-    solve_as,
-    solve_sparse,
-    with_one_program,
-)
+from ...support.block_structures import assert_alike, solve_as, solve_sparse, with_one_program
 from ...support.loaded_slider_crank import loaded
-from ...support.mechanisms import (
-    Z,
-    crank_tip,
-    errors,
-    four_bar,
-    gears,
-    mcpherson,
-)
+from ...support.mechanisms import Z, crank_tip, errors, four_bar, gears, mcpherson
 
 
 def turning(*values, rate=1.0):

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import msgspec
 import numpy as np
 import pytest
+from kincheck import Outcome
 from kincheck.adapters.floors.floors import Floor
 from kincheck.core.case.case import Truth
 from kincheck.core.cli import main
@@ -19,7 +20,6 @@ from kincheck.core.extensions.laboratory.bench.engines import Bench
 from kincheck.core.extensions.laboratory.bench.report import precision_diagram, report
 from kincheck.core.extensions.laboratory.paper import formulation
 from kincheck.core.extras import THREADS
-from kincheck.core.harness.record import Outcome
 from kincheck.core.report.sections import page
 
 from ...report.page import Page
@@ -54,7 +54,7 @@ def test_slow_first_calls_are_not_timed(monkeypatch):
     now, took = [0.0], iter([0.1, 0.2, *[0.001] * 200])
     monkeypatch.setattr(rounds, "perf_counter", lambda: now[0])
 
-    def work() -> None:
+    def work():
         now[0] += next(took)
 
     assert rounds.warm_up(work) == pytest.approx(0.001)

@@ -6,6 +6,7 @@ import sys
 import kincheck.cases
 import numpy as np
 import pytest
+from kincheck import solve
 from kincheck.core.algebra import Mat3, Vec3, cross
 from kincheck.core.cli import main
 from kincheck.core.extensions.laboratory.paper import formulation as bench_formulation
@@ -27,7 +28,6 @@ from kincheck.core.extensions.laboratory.paper.operations import (
     count_traced,
     skew,
 )
-from kincheck.core.kinematics import solve
 from kincheck.core.report.sections import Report, Section, page
 
 SEED = 943745

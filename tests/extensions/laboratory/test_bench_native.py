@@ -9,8 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
-from kincheck.core import SolveError
+from kincheck import Outcome, SolveError, adapters, cases
 from kincheck.core.case.case import without_forces
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.laboratory.bench import (
@@ -21,7 +20,6 @@ from kincheck.core.extensions.laboratory.bench import (
     rounds,
     size,
 )
-from kincheck.core.harness.record import Outcome
 
 from ...support.loads import loaded
 

@@ -6,7 +6,7 @@ that is what keeps Newton off the spurious zeros (formulation section 3).
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Mechanism, OrientationLock, SolveError
+from kincheck import Body, Mechanism, OrientationLock, SolveError
 from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, turned_by
 from kincheck.core.extensions.laboratory.paper.rows import (
     LockTest,
@@ -19,8 +19,7 @@ from kincheck.core.extensions.laboratory.paper.rows import (
 )
 from kincheck.core.kinematics import formulate, styles
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.primitives import Dot11, Dot12, NamedTurn
-from kincheck.core.primitives.base import GROUND_POSE, Pose
+from kincheck.core.primitives import GROUND_POSE, Dot11, Dot12, NamedTurn, Pose
 
 from ...support.specimens import (
     LANES,

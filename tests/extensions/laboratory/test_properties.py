@@ -13,12 +13,10 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from kincheck import adapters
-from kincheck.core import PointCoordinate
+from kincheck import PointCoordinate, Sine, adapters
 from kincheck.core.extensions.laboratory.stress.families.base import bodies, swept
 from kincheck.core.extensions.laboratory.stress.families.loops import random_mechanism
 from kincheck.core.extensions.laboratory.stress.verdicts import with_numpy_executor
-from kincheck.core.mechanism.motions import Sine
 from scipy.spatial.transform import Rotation
 
 from ...support import mechanisms

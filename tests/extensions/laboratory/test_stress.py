@@ -6,13 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import cases
+from kincheck import KincheckError, Outcome, SolveError, cases, clear_caches
 from kincheck.adapters import engine
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
-from kincheck.core.caches import clear_caches
 from kincheck.core.case.io.case_file import case_text, load_case
-from kincheck.core.errors import KincheckError, SolveError
 from kincheck.core.extensions.laboratory.stress.families import FAMILIES, Family, Specimen
 from kincheck.core.extensions.laboratory.stress.families.base import as_case
 from kincheck.core.extensions.laboratory.stress.families.linkages import (
@@ -34,11 +32,10 @@ from kincheck.core.extensions.laboratory.stress.verdicts import (
 from kincheck.core.extensions.laboratory.truth.forces import known_forces
 from kincheck.core.extensions.laboratory.truth.motion import Reach, follow_motion
 from kincheck.core.failures import FailureKind
-from kincheck.core.forces import Forces
 from kincheck.core.harness.execution import Answer, Failure, Pair
 from kincheck.core.harness.native_engine import NativeEngine
-from kincheck.core.harness.record import Outcome
-from kincheck.core.joints.base import AxialJoint, unit
+from kincheck.core.joints import AxialJoint
+from kincheck.core.joints.base import unit
 
 from ...support.engine_faults import changed
 from ...support.fakes import Fake, native_but, raising
@@ -374,7 +371,7 @@ def verdicts(made, number, change=lambda forces: forces):
     return judge_answer(one.specimen, one.case, one.truth, answer)
 
 
-def joints(forces: Forces, change) -> Forces:
+def joints(forces, change):
     return replace(forces, joints={name: change(each) for name, each in forces.joints.items()})
 
 

@@ -7,12 +7,10 @@ from dataclasses import replace
 import kincheck.adapters
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import solve
+from kincheck import CaseError, KincheckError, PointMotion, cases, solve
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.cli import main
-from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.extensions.laboratory.stress.families.base import as_case
 from kincheck.core.extensions.laboratory.stress.families.linkages import (
     any_plane,
@@ -27,7 +25,6 @@ from kincheck.core.extensions.laboratory.stress.reduction import (
 from kincheck.core.extensions.laboratory.stress.report import headline, markdown, report
 from kincheck.core.extensions.laboratory.stress.run import Cell, Finding, Stress
 from kincheck.core.extensions.laboratory.stress.verdicts import Verdict
-from kincheck.core.trajectory import PointMotion
 
 from ...support.fakes import Fake, crank, native_but, swept
 from ...support.written_again import written_again
@@ -63,11 +60,7 @@ def test_stress_writes_tables_and_data(tmp_path, capsys):
     assert sum(found["cells"][0]["samples"].values()) >= 20
     assert found["findings"] == []
     assert "None of" in err
-    assert {file.name for file in new.iterdir()} == {
-        "stress.json",
-        "stress.html",
-        "stress.md",
-    }
+    assert {file.name for file in new.iterdir()} == {"stress.json", "stress.html", "stress.md"}
     assert "| units | native projection |" in (new / "stress.md").read_text(encoding="utf-8")
     assert "silently wrong" in (new / "stress.html").read_text(encoding="utf-8")
 

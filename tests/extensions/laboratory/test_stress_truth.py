@@ -6,12 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import solve
+from kincheck import KincheckError, Point, Spherical, cases, solve
 from kincheck.core.case.case import Output, without_forces
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.case.joint_probe import probes
-from kincheck.core.errors import KincheckError
 from kincheck.core.extensions.laboratory.stress.families.base import as_case
 from kincheck.core.extensions.laboratory.stress.families.degenerate import SOUND, WRONG
 from kincheck.core.extensions.laboratory.stress.families.linkages import (
@@ -33,8 +31,6 @@ from kincheck.core.extensions.laboratory.truth.motion import (
 )
 from kincheck.core.extensions.laboratory.truth.proofs import distance_from_proof
 from kincheck.core.extensions.laboratory.truth.rows import NotStatedError, Poses, Rows, extended
-from kincheck.core.joints import Spherical
-from kincheck.core.mechanism.mechanism import Point
 
 from ...support.fakes import swept
 

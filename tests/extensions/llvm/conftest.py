@@ -3,7 +3,7 @@
 from shutil import copytree
 
 import pytest
-from kincheck.core.caches import clear_caches
+from kincheck import clear_caches
 from kincheck.core.extensions.llvm import compiler, jit, machine_code
 
 

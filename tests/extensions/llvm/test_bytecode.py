@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -25,7 +24,7 @@ pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 pytestmark = pytest.mark.usefixtures("no_programs_kept")
 
 
-def both(run: Callable[[LlvmCode], np.ndarray], plan: Plan) -> None:
+def both(run, plan):
     """What is interpreted is what is compiled."""
     made = LlvmCode(plan)
     assert made.interpreted
@@ -35,7 +34,7 @@ def both(run: Callable[[LlvmCode], np.ndarray], plan: Plan) -> None:
     assert run(made).tobytes() == interpreted.tobytes()  # the sign of zeros too
 
 
-def every_slot(made: LlvmCode, name: str = "f", values: np.ndarray | None = None) -> np.ndarray:
+def every_slot(made, name="f", values=None):
     """All slots after a program was run on numbers, in the first slots."""
     slots = range(len(made.plan.slots))
     if values is None:

@@ -10,8 +10,7 @@ from pickle import dumps
 
 import numpy as np
 import pytest
-from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve
-from kincheck.core.caches import clear_caches
+from kincheck import Body, JointAngle, Mechanism, Point, Ramp, Revolute, clear_caches, solve
 from kincheck.core.extensions.llvm import jit
 from kincheck.core.extensions.llvm.jit import LlvmCode
 from kincheck.core.kinematics.compiled import compiled_model
@@ -19,7 +18,6 @@ from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.mechanism import motions
-from kincheck.core.mechanism.motions import Ramp
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 

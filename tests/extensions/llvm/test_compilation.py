@@ -8,7 +8,7 @@ from time import sleep
 
 import numpy as np
 import pytest
-from kincheck.core import solve
+from kincheck import Ramp, solve
 from kincheck.core.extensions.blocks.components import components
 from kincheck.core.extensions.designs.design_batch import solve_variants
 from kincheck.core.extensions.llvm import jit as llvm
@@ -18,7 +18,7 @@ from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.mechanism.motions import Path
 from kincheck.core.program import Plan, Program, Tape, program
 from kincheck.core.program.executor import compiled_at_once
 
@@ -100,7 +100,7 @@ def test_interrupted_compilation_is_repeated(monkeypatch):
     made = LlvmCode(compile_model(four_bar(), Request(("turn",), ())).plan)
     wanted = every_slot(made, "newton")
 
-    def interrupted(*_: object) -> None:
+    def interrupted(*_):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
@@ -124,7 +124,7 @@ def test_threads_compile_program_once(monkeypatch):
         sleep(0.2)
         return load(*given)
 
-    def count() -> None:
+    def count():
         meet.wait()
         made.count(10**9)
 

@@ -9,6 +9,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from kincheck import Ramp
 from kincheck.core.extensions.llvm.executor import LlvmExecutor
 from kincheck.core.extensions.llvm.jit import OFTEN, LlvmCode
 from kincheck.core.extensions.llvm.machine_code import works
@@ -18,7 +19,7 @@ from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import follow_samples, marcher
-from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.mechanism.motions import Path
 from kincheck.core.program import NODES, NumpyExecutor, Plan, Tape, absolute, before, program
 
 from ...support.mechanisms import four_bar, mcpherson, slider_crank

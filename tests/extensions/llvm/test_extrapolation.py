@@ -6,18 +6,12 @@ from functools import partial
 
 import numpy as np
 import pytest
+from kincheck import Ramp
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
-from kincheck.core.kinematics.compiled.request import (
-    ACCEPT,
-    FROM,
-    RATE,
-    RATE_T,
-    TIME,
-    Request,
-)
+from kincheck.core.kinematics.compiled.request import ACCEPT, FROM, RATE, RATE_T, TIME, Request
 from kincheck.core.kinematics.compiled.routes import weights_of_groups, weights_of_samples
 from kincheck.core.kinematics.continuation.sweep import sweep
-from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.mechanism.motions import Path
 from kincheck.core.program import NODES, NumpyExecutor, groups_behind, place_of
 
 from ...support.mechanisms import errors, mcpherson, slider_crank, slider_crank_motion

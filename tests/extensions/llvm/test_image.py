@@ -9,8 +9,7 @@ from ctypes import CFUNCTYPE, c_double
 
 import numpy as np
 import pytest
-from kincheck.core import solve
-from kincheck.core.caches import clear_caches
+from kincheck import clear_caches, solve
 from kincheck.core.extensions.llvm import compiler, jit
 from kincheck.core.program.executor import compiled_at_once
 
@@ -71,7 +70,7 @@ def test_image_with_external_call_is_refused():
         compiler.image_of(compiler.emit(text))
 
 
-def positions() -> np.ndarray:
+def positions():
     clear_caches()
     return solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points["wheel"].position
 
@@ -104,7 +103,7 @@ print("llvmlite" in sys.modules)
 def test_second_process_imports_no_llvm(tmp_path):
     here = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
 
-    def imported() -> str:
+    def imported():
         return subprocess.run(
             [sys.executable, "-c", SOLVE], env=here, capture_output=True, text=True, check=True
         ).stdout.strip()
@@ -117,7 +116,7 @@ def test_processor_description_is_cached(cache_folder, monkeypatch):
     expected, asked, ask = compiler.processor(), list[str](), compiler._ask_llvm
     monkeypatch.setattr(compiler, "_ask_llvm", lambda: asked.append("once") or ask())
 
-    def found() -> compiler.Processor:
+    def found():
         compiler.processor.cache_clear()  # as another process
         return compiler.processor()
 

@@ -8,9 +8,8 @@ import math
 
 import numpy as np
 import pytest
-from kincheck.core import solve
+from kincheck import clear_caches, solve
 from kincheck.core.algebra import arc_tangent, root
-from kincheck.core.caches import clear_caches
 from kincheck.core.extensions.designs.design_batch import solve_designs
 from kincheck.core.extensions.llvm import compiler
 from kincheck.core.extensions.llvm.executor import LlvmExecutor
@@ -37,7 +36,7 @@ from ...support.mechanisms import chain, four_bar, mcpherson
 llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
 
-def executors(function, inputs: int, lanes: int):
+def executors(function, inputs, lanes):
     """The same program of `inputs` slots, its value in the next one, in both executors."""
     tape = Tape()
     traced = program("f", tape, {inputs: function(*(tape.input(k) for k in range(inputs)))})

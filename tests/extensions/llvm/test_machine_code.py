@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from kincheck.core import solve
-from kincheck.core.caches import clear_caches
+from kincheck import clear_caches, solve
 from kincheck.core.extensions.llvm import compiler, jit, machine_code
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.program.executor import compiled_at_once

@@ -11,18 +11,20 @@ from pathlib import Path
 import kincheck.cases
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
     JointAngle,
     JointDisplacement,
     Mechanism,
     Point,
     PointCoordinate,
+    Ramp,
     Revolute,
+    SolveError,
+    solve,
 )
 from kincheck.core.algebra import root
 from kincheck.core.case.joint_probe import probes
-from kincheck.core.errors import SolveError
 from kincheck.core.extensions.proofs import krawczyk
 from kincheck.core.extensions.proofs.ball_executor import UndecidedError, evaluate, precision
 from kincheck.core.extensions.proofs.exact import (
@@ -34,12 +36,10 @@ from kincheck.core.extensions.proofs.exact import (
 )
 from kincheck.core.extensions.proofs.krawczyk import Enclosure, UnprovedError
 from kincheck.core.extensions.proofs.proofs import _states, prove
-from kincheck.core.kinematics.formulation.cartesian import Cartesian
-from kincheck.core.kinematics.formulation.constraints import constraints, frames
-from kincheck.core.kinematics.one_design import solve
+from kincheck.core.kinematics import Cartesian, constraints
+from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
 from kincheck.core.mechanism.motions import Path as Way
-from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.program import Tape, absolute, cos, program, sin, where_larger
 from kincheck.core.program.tape import jacobian
 

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from kincheck import cases
+from kincheck import Ramp, Revolute, Translational, cases
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.extensions.proofs import exact_forces
@@ -14,11 +14,10 @@ from kincheck.core.extensions.proofs.exact import as_decimal, as_double
 from kincheck.core.extensions.proofs.krawczyk import Enclosure
 from kincheck.core.extensions.proofs.proofs import prove
 from kincheck.core.extensions.proofs.verified_reference import prove_case
-from kincheck.core.joints import Revolute, Translational
-from kincheck.core.joints.base import AxialJoint, unit
+from kincheck.core.joints import AxialJoint
+from kincheck.core.joints.base import unit
 from kincheck.core.kinematics.forces import equations
-from kincheck.core.mechanism.mechanism import Mechanism
-from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.mechanism.motions import Path
 
 from ...support.driven_chains import COUPLINGS, Link, at_origins, chain
 from ...support.loaded_slider_crank import loaded, pushed
@@ -30,13 +29,11 @@ RATE = 1.5
 ANGLES = [-0.75, 0.0, 0.5, 7.0]
 
 
-def proved(mechanism: Mechanism, values=ANGLES, rate=RATE, reading=as_double):
+def proved(mechanism, values=ANGLES, rate=RATE, reading=as_double):
     """The samples of a sweep, and the native motion."""
     (driver,) = mechanism.drivers
     values = np.asarray(values, dtype=float)
-    drives = {
-        driver.name: [(Fraction(x), Fraction(rate), Fraction(0)) for x in values.tolist()],
-    }
+    drives = {driver.name: [(Fraction(x), Fraction(rate), Fraction(0)) for x in values.tolist()]}
     members = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
     names = [each.name for each in members]
     path = Path({driver.name: Ramp(rate)}, values / rate)

@@ -11,11 +11,11 @@ import kincheck.cases
 import msgspec
 import numpy as np
 import pytest
-from kincheck.core.case.case import ORDERS, Case, Sweep, Truth
+from kincheck import Case, KincheckError
+from kincheck.core.case.case import ORDERS, Sweep, Truth
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.case.io.reference_file import read, series, with_proved_references
-from kincheck.core.errors import KincheckError
 from kincheck.core.extensions.proofs import ball_executor
 from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.jet import arctan2
@@ -103,10 +103,7 @@ def test_unproved_sample_is_nan(made):
     ("changes", "problem"),
     [
         ({"case": "other"}, "case: found 'other', expected one of the cases to be run: crank"),
-        (
-            {"driver": {"turn": [0.0]}},
-            "driver: found other samples than those of the sweep",
-        ),
+        ({"driver": {"turn": [0.0]}}, "driver: found other samples than those of the sweep"),
         ({"outputs": {}}, "outputs: found none, expected outputs of the case"),
         ({"schema": "kincheck-results/1"}, "expected a proved reference"),
         ({"zq_unknown": 1}, "unknown field `zq_unknown`, expected a proved reference"),

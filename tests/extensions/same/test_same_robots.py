@@ -22,8 +22,9 @@ from ...support.examples import examples
 
 (CHANGES,) = examples(__file__, "changes")
 
-if "usd" not in extensions() or importlib.util.find_spec("pxr") is None:
-    FORMATS = {form: way for form, way in FORMATS.items() if form != "USD"}
+absent = {"OpenSim": "osim" not in extensions()}
+absent["USD"] = "usd" not in extensions() or importlib.util.find_spec("pxr") is None
+FORMATS = {form: way for form, way in FORMATS.items() if not absent.get(form)}
 SEEDS = range(int(os.environ.get("KINCHECK_ROBOTS", "8")))
 LOST = re.compile(r"lost in (\S+): (.+) of ([^()]+?)( \(\w+ cannot say it\))?")
 
@@ -128,6 +129,7 @@ def test_tendons_and_balls_are_compared(old, new, text, tmp_path):
     assert text in found
 
 
+@pytest.mark.needs("osim")
 def test_format_without_words_is_named(tmp_path):
     robot = random_closed(2, LAWS)
     files = files_of(robot, tmp_path, 2)
