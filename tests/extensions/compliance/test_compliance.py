@@ -23,6 +23,9 @@ from kincheck.core.mechanism.mechanism import Point
 
 from ...kinematics.test_bushings import bushed
 from ...support.engine_motion import SIMULATORS, installed
+from ...support.examples import examples
+
+(HINGES,) = examples(__file__, "hinges")
 
 DATA = Path(__file__).parents[2] / "data" / "elastokinematics"
 STRUT = json.loads((DATA / "5_strut_kc.json").read_text())
@@ -324,12 +327,6 @@ def test_bushing_file_for_hardpoint_table(tmp_path, capsys):
     rubber.write_text(rubber.read_text().replace("lca_pivot", "lower_pivot"))
     assert main(["kc", str(table), *options]) == 2
     assert "'lower_pivot'" in capsys.readouterr().err
-
-
-HINGES = {
-    "uca_pivot": {"front": (0.09, 0.26, 0.285), "rear": (-0.11, 0.265, 0.28)},
-    "lca_pivot": {"front": (0.12, 0.21, 0.125), "rear": (-0.13, 0.215, 0.12)},
-}
 
 
 @pytest.fixture(scope="module")

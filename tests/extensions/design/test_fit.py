@@ -16,6 +16,10 @@ from kincheck.core.extensions.design.likely import most_likely
 from kincheck.core.extensions.design.rig import read_rig
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
+from ...support.examples import examples
+
+(SLIDES,) = examples(__file__, "slides")
+
 DEG = np.pi / 180.0
 NOISE = {"toe": 0.005 * DEG, "camber": 0.01 * DEG, "half_track_change": 5e-5}
 SIZES = {"toe": ("deg", DEG), "camber": ("deg", DEG), "half_track_change": ("mm", 1e-3)}
@@ -166,32 +170,6 @@ def test_fit_few_moves_leave_no_slip(bench):
     for place, move in moves.items():
         assert found.moves[place] == pytest.approx(move, abs=3.0 * found.deviations[place])
     assert found.combinations[0].source == "from the rig"
-
-
-SLIDES = {
-    "double_wishbone": [
-        "uca_front along the line to uca_rear",
-        "uca_rear along the line to uca_front",
-        "lca_front along the line to lca_rear",
-        "lca_rear along the line to lca_front",
-    ],
-    "mcpherson": [
-        "lca_front along the line to lca_rear",
-        "lca_rear along the line to lca_front",
-        "strut_lower along the line to strut_upper",
-    ],
-    "semi_trailing_arm": [
-        "arm_inner along the line to arm_outer",
-        "arm_outer along the line to arm_inner",
-    ],
-    "three_link": [  # the ball of the arm is the middle of a sphere: rods keep the angle seen there
-        "upper_inner along the line to arm_pivot",
-        "upper_outer along the line to arm_pivot",
-        "lower_inner along the line to arm_pivot",
-        "lower_outer along the line to arm_pivot",
-    ],
-    "five_link": [],
-}
 
 
 @pytest.mark.by_day(5)

@@ -18,6 +18,10 @@ from kincheck.core.harness import run as running
 from kincheck.core.harness.record import Outcome
 from scipy.optimize import minimize
 
+from ...support.examples import examples
+
+(BAD_TEXTS,) = examples(__file__, "bad_texts")
+
 DEG = np.pi / 180.0
 TRAVEL = np.linspace(-0.03, 0.03, 7)
 RODS = [
@@ -347,19 +351,7 @@ def test_tune_follows_measured_curve(car):
 
 @pytest.mark.parametrize(
     ("goal", "move", "message"),
-    [
-        ("to = 0 +- 1 deg", "tierod_inner: y +- 1 mm", "did you mean 'toe'?"),
-        ("toe = 0", "tierod_inner: y +- 1 mm", "expected an output, a value and a tolerance"),
-        ("toe = 0 +- 1 mm", "tierod_inner: y +- 1 mm", "found the unit 'mm'"),
-        ("toe = 0 +- -1 deg", "tierod_inner: y +- 1 mm", "expected a positive number"),
-        ("toe at 90mm = 0 +- 1 deg", "tierod_inner: y +- 1 mm", "lies beyond the travel"),
-        ("toe = no.csv +- 1 deg", "tierod_inner: y +- 1 mm", "neither a number nor a file"),
-        ("toe = 0 +- 1 deg", "tierod_iner: y +- 1 mm", "did you mean 'tierod_inner'?"),
-        ("toe = 0 +- 1 deg", "tierod_inner: y", "expected points, axes and a box"),
-        ("toe = 0 +- 1 deg", "tierod_inner: y y +- 1 mm", "is given twice"),
-        ("toe = 0 +- 1 deg", "tierod_inner: y +- 1 deg", "expected a positive number of m"),
-        ("toe = 0 +- 1 deg", "tierod_inner: y +5 mm", "expected a positive number of m"),
-    ],
+    BAD_TEXTS,
 )
 def test_tune_bad_text_is_refused(car, capsys, goal, move, message):
     assert main(["tune", str(car), "--goal", goal, "--move", move]) == 2

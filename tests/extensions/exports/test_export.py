@@ -33,10 +33,13 @@ from scipy.spatial.transform import Rotation
 from ...oracles.naive import A
 from ...support.case_texts import write
 from ...support.engine_motion import cutting, mechanism_of
+from ...support.examples import examples
 from ...support.exported import READERS, read
 from ...support.mechanisms import mcpherson, slider_crank
 from ...support.model_files import driven
 from ...support.written_mechanisms import CASES, Z, assert_read, case, coupled_loop, way
+
+(BAD_ARGUMENTS,) = examples(__file__, "bad_arguments")
 
 
 @pytest.mark.parametrize("to", offers("writers"))
@@ -152,16 +155,7 @@ def test_export_command_writes_files(to, endings, tmp_path, monkeypatch, capsys)
 
 @pytest.mark.parametrize(
     ("argv", "said"),
-    [
-        (["--to", "mjfc"], "there is no format 'mjfc'; did you mean 'mjcf'?"),
-        (["--to", "mjcf"], "mcpherson_strut.xml exists already"),
-        (["--to", "mjcf", "--at", "nan"], "'nan' is not a number"),
-        (["--to", "mjcf", "--at", "-3deg"], "'-3deg' is not a number with one of the units m, mm"),
-        (
-            ["--to", "mjcf", "--out", "nowhere/strut.xml"],
-            "--out nowhere/strut.xml: cannot be written; give a file in a folder that exists",
-        ),
-    ],
+    BAD_ARGUMENTS,
 )
 def test_export_command_refuses_bad_arguments(argv, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -10,17 +10,14 @@ from kincheck.core.errors import CaseError
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.harness.execution import Pair, attempt
 
+from ...support.examples import examples
 from ...support.rods_of_templates import arm_rate, carrier_of, solved, turn_about
+
+(BAR,) = examples(__file__, "bar")
 
 CLOSE = 1e-11
 """Round-off over the sine of the angle between a rod and the path of its end, 0.05 and more."""
 STEP = 1e-4
-BAR = {
-    "bar_axis": (0.2, 0.3, 0.2),
-    "bar_axis_inner": (0.21, 0.05, 0.21),
-    "bar_link_inner": (0.02, 0.42, 0.23),
-    "bar_link_outer": (0.02, 0.44, 0.12),
-}
 
 
 def answered(case):

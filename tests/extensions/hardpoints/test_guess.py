@@ -14,76 +14,11 @@ from kincheck.core.errors import OpenError
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from ...support.case_texts import write
+from ...support.examples import examples
+
+RACE, ROAD, NAMES = examples(__file__, "race", "road", "names")
 
 # A double wishbone of a race car, and a strut of a road car: x forward, y left, z up [mm].
-RACE = {
-    "uca_front": (118.5, 240.5, 262.5),
-    "uca_rear": (-117.5, 243.5, 255.5),
-    "uca_outer": (-12.5, 552.5, 281.5),
-    "lca_front": (151.5, 171.5, 112.5),
-    "lca_rear": (-149.5, 168.5, 127.5),
-    "lca_outer": (3.5, 580.5, 121.5),
-    "tierod_inner": (52.5, 150.5, 144.5),
-    "tierod_outer": (70.5, 562.5, 150.5),
-    "wheel_center": (0.5, 610.5, 203.5),
-}
-ROAD = {
-    "lca_front": (95.5, 365.5, 148.5),
-    "lca_rear": (-205.5, 352.5, 160.5),
-    "lca_outer": (-6.5, 712.5, 139.5),
-    "strut_lower": (-22.5, 655.5, 395.5),
-    "strut_upper": (-38.5, 585.5, 801.5),
-    "tierod_inner": (-112.5, 322.5, 205.5),
-    "tierod_outer": (-131.5, 668.5, 198.5),
-    "wheel_center": (0.5, 758.5, 297.5),
-}
-NAMES = {
-    "German": (
-        "Querlenker vorn oben|Querlenker hinten oben|Querlenker oben außen|Querlenker vorn unten|"
-        "Querlenker hinten unten|Querlenker unten außen|Spurstange innen|Spurstange außen|Radmitte"
-    ),
-    "French": (
-        "Triangle supérieur avant|Triangle supérieur arrière|Rotule supérieure|"
-        "Triangle inférieur avant|Triangle inférieur arrière|Rotule inférieure|"
-        "Biellette de direction intérieure|Biellette de direction extérieure|Centre roue"
-    ),
-    "Italian": (
-        "Braccio superiore anteriore|Braccio superiore posteriore|Braccio superiore esterno|"
-        "Braccio inferiore anteriore|Braccio inferiore posteriore|Braccio inferiore esterno|"
-        "Tirante sterzo interno|Tirante sterzo esterno|Centro ruota"
-    ),
-    "Spanish": (
-        "Trapecio superior delantero|Trapecio superior trasero|Rótula superior|"
-        "Trapecio inferior delantero|Trapecio inferior trasero|Rótula inferior|"
-        "Bieleta de dirección interior|Bieleta de dirección exterior|Centro de rueda"
-    ),
-    "Chinese": (
-        "上控制臂前点|上控制臂后点|上控制臂外点|下控制臂前点|下控制臂后点|下控制臂外点|"
-        "转向拉杆内点|转向拉杆外点|轮心"
-    ),
-    "Lotus": (
-        "Upper wishbone front pivot|Upper wishbone rear pivot|Upper wishbone outer ball joint|"
-        "Lower wishbone front pivot|Lower wishbone rear pivot|Lower wishbone outer ball joint|"
-        "Inner track rod ball joint|Outer track rod ball joint|Wheel centre point"
-    ),
-    "OptimumK": (
-        "CHAS_UppFor|CHAS_UppAft|UPRI_UppPnt|CHAS_LowFor|CHAS_LowAft|UPRI_LowPnt|CHAS_TiePnt|"
-        "UPRI_TiePnt|Wheel_Centre"
-    ),
-    "numbers": "1|2|3|4|5|6|7|8|9",
-    "strut, German": (
-        "Querlenker vorn|Querlenker hinten|Traggelenk|Federbein unten|Federbein oben (Domlager)|"
-        "Spurstange innen|Spurstange außen|Radmittelpunkt"
-    ),
-    "strut, French": (
-        "Bras avant|Bras arrière|Rotule|Jambe de force bas|Jambe de force haut|"
-        "Biellette int.|Biellette ext.|Centre de roue"
-    ),
-    "strut, Italian": (
-        "Braccio ant.|Braccio post.|Giunto sferico|Montante inferiore|Montante superiore|"
-        "Tirante int.|Tirante est.|Centro ruota"
-    ),
-}
 
 
 def rows(names, form="{};{};{};{}", points=RACE, turn=lambda x, y, z: (x, y, z)):

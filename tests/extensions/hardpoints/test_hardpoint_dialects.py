@@ -14,6 +14,9 @@ from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 
 from ...support.case_texts import complains, rows, write
+from ...support.examples import examples
+
+(LOTUS,) = examples(__file__, "lotus")
 
 POINTS = {
     "uca_front": (-89.75, -259.75, 285.25),
@@ -55,20 +58,6 @@ OPTIMUM = dict(
         strict=True,
     )
 )
-LOTUS = {
-    **{
-        f"{arm}_{end}": f"{place} wishbone {pivot}"
-        for arm, place in (("uca", "Upper"), ("lca", "Lower"))
-        for end, pivot in (
-            ("front", "front pivot"),
-            ("rear", "rear pivot"),
-            ("outer", "outer ball joint"),
-        )
-    },
-    "tierod_inner": "Inner track rod ball joint",
-    "tierod_outer": "Outer track rod ball joint",
-    "wheel_center": "Wheel centre point",
-}
 RIGHT = {f"{name}_right": (x, -y, z) for name, (x, y, z) in POINTS.items()}
 LEFT = {f"{name}_left": at for name, at in POINTS.items()}
 

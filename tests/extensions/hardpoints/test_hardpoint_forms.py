@@ -13,7 +13,10 @@ from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
 
 from ...support.case_texts import complains, line_with, rows, write
+from ...support.examples import examples
 from .test_hardpoint_dialects import POINTS, comma, table
+
+(CORNERS,) = examples(__file__, "corners")
 
 SAID = Supplied("double_wishbone", "mm", "rearward,right,up")
 
@@ -213,14 +216,6 @@ def test_hardpoint_form_faults(tmp_path, name, form, old, new, message):
         pytest.importorskip("yaml")
     assert old in TEXTS[form]
     complains(write(tmp_path, TEXTS[form].replace(old, new, 1), name), message, SAID)
-
-
-CORNERS = {
-    "Achse;Seite": {"FL": "vorn;links", "FR": "vorn;rechts", "RL": "hinten;links"},
-    "ACHSE;SEITE": {"FL": "VA;L", "FR": "VA;R", "RL": "HA;L"},
-    "Ecke;Text": {"FL": "VL;a", "FR": "VR;a", "RL": "HL;a"},
-    "Rad;Text": {"FL": "vorne links;a", "FR": "vorne rechts;a", "RL": "hinten links;a"},
-}
 
 
 @pytest.mark.parametrize("heads", CORNERS)

@@ -12,18 +12,12 @@ from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 
 from ...support.case_texts import write
+from ...support.examples import examples
+
+(WRONG_BUSHINGS,) = examples(__file__, "wrong_bushings")
 
 NAME = "zq_unknown"
 BUSHINGS = "[bushings.uca_front]\nstiffness = 5e6\n"
-WRONG_BUSHINGS = {
-    "table": ("bushings", "bushing"),
-    "key": ("stiffness", "stifness"),
-    "role": ("uca_front", "uca_frnt"),
-    "more": ("[bushings", "[forces.spring]\nq = 1\n[bushings"),
-    "no table": (BUSHINGS, "bushings = 5\n"),
-    "singular joint": (BUSHINGS, "[joint.uca.bushings.a]\nstiffness = 1\n"),
-    "key of joint": (BUSHINGS, "[joints.uca_pivot]\nstiffness = 1\n"),
-}
 
 
 @pytest.mark.parametrize("fault", WRONG_BUSHINGS)

@@ -10,7 +10,10 @@ from kincheck.core.case.models.files import load
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from ...support.case_texts import complains, write
+from ...support.examples import examples
 from ...support.rods_of_templates import solved
+
+(GAME,) = examples(__file__, "game")
 
 SAID = Supplied("double_wishbone", "m", "forward,left,up", travel="0.03:5")
 SAMPLE = {
@@ -39,17 +42,6 @@ def lines_of(form, name=written):
 
 WHEEL = SAMPLE["wheel_center"]
 INBOARD = {role: (WHEEL[1] - y, z - WHEEL[2], x - WHEEL[0]) for role, (x, y, z) in SAMPLE.items()}
-GAME = {
-    **{
-        f"{arm}_{end}": f"WBCAR_{place}_{end.upper()}"
-        for arm, place in (("uca", "TOP"), ("lca", "BOTTOM"))
-        for end in ("front", "rear")
-    },
-    "uca_outer": "WBTYRE_TOP",
-    "lca_outer": "WBTYRE_BOTTOM",
-    "tierod_inner": "WBCAR_STEER",
-    "tierod_outer": "WBTYRE_STEER",
-}
 ASSETTO = (
     "[BASIC]\nWHEELBASE=2.6\n[FRONT]\nTYPE=DWB\nBASEY=-0.12 ; of the centre of gravity\n"
     f"TRACK={2 * WHEEL[1]}\n"

@@ -18,6 +18,7 @@ from kincheck.core.report.report import write_report
 from kincheck.core.report.table import print_matrix, print_table, to_markdown
 
 from ...support.case_texts import refused
+from ...support.examples import examples
 from ...support.rods_of_templates import solved
 from ...support.suspension_files import (
     STRUT,
@@ -30,6 +31,8 @@ from ...support.suspension_files import (
 )
 from ...support.variations import HEAD
 from ...support.written_again import written_again
+
+(FAULTS,) = examples(__file__, "faults")
 
 POINTS = STRUT["points"] | {"top": {"body": "chassis", "position": [1.0, 0.55, 0.6]}}
 RODS = [["strut_top", "strut_foot"]]
@@ -338,16 +341,6 @@ def test_wheel_points_equal_wheel_numbers():
     expected = solved(loaded(data))
     for name, values in solved(loaded(pointed())).items():
         np.testing.assert_allclose(values, expected[name], rtol=1e-12, atol=1e-12, err_msg=name)
-
-
-FAULTS = [
-    ({"wheel_axis": "hubb"}, "suspension.wheel_axis", "did you mean 'hub'"),
-    ({"static_toe": 0.01}, "suspension.wheel_axis", "beside static_toe and static_camber"),
-    ({"wheel_radius": 0.3}, "suspension.wheel_contact", "beside wheel_radius"),
-    ({"wheel_axis": "inboard"}, "suspension.wheel_axis", "not outboard of the wheel's centre"),
-    ({"wheel_contact": "strut_top"}, "suspension.wheel_contact", "'strut', expected a point of"),
-    ({"wheel_contact": "wheel_center"}, "suspension.wheel_contact", "at the wheel's centre"),
-]
 
 
 @pytest.mark.parametrize(("changes", "key", "words"), FAULTS, ids=str)

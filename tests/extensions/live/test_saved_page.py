@@ -20,8 +20,11 @@ from kincheck.core.extensions.live.saved import saved_page
 from kincheck.core.extensions.live.table import LiveTable
 from kincheck.core.report.curves import write_curves
 
+from ...support.examples import examples
 from .conftest import CAR
 from .test_live_page import FIELD, answered, drag, height, text, type_in, until_state
+
+(OPEN,) = examples(__file__, "open")
 
 CLOSE = 1e-12
 """Largest difference [m, rad and per m], a thousand round-offs of steps that differ."""
@@ -172,25 +175,6 @@ def test_saved_page_saves_table(saved, browser, car):
         for each in (made, car)
     ]
     assert toes[0] == toes[1]
-
-
-OPEN = {
-    "schema": "kincheck-case/1",
-    "name": "open",
-    "source": "a rod of 9 m between places that are 1 m apart",
-    "bodies": {"crank": {}, "arm": {}},
-    "joints": {
-        "pivot": {"type": "revolute", "bodies": ["ground", "crank"], "point": [0, 0, 0],
-                  "axis": [0, 0, 1]},
-        "elbow": {"type": "revolute", "bodies": ["crank", "arm"], "point": [1, 0, 0],
-                  "axis": [0, 0, 1]},
-        "rod": {"type": "distance", "bodies": ["ground", "arm"],
-                "points": [[2, 1, 0], [2, 0, 0]], "length": 9},
-    },
-    "drivers": {"turn": {"type": "joint_angle", "joint": "pivot"}},
-    "sweep": {"driver": "turn", "start": 0, "stop": 1, "steps": 3},
-    "outputs": {"angle": {"type": "joint_angle", "joint": "elbow"}},
-}  # fmt: skip
 
 
 @pytest.mark.parametrize(

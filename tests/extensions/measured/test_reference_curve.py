@@ -10,17 +10,20 @@ import kincheck.adapters
 import kincheck.core
 import numpy as np
 import pytest
-from kincheck import Outcome
 from kincheck.adapters.native import Native
 from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.extensions.measured.reference_curve import CurveOptions, with_curve
+from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
 from ...support.case_texts import refused, write
+from ...support.examples import examples
 from ...support.rods_of_templates import solved
 from ...support.suspension_files import strut_of_table
+
+FAULTS, FORMS = examples(__file__, "faults", "forms")
 
 # Two minutes of arc: the repeatability of a rig, made up; its noise is an eighth of that.
 ATOL = 2.0 / 60.0
@@ -57,27 +60,6 @@ def judged(car, file, **options):
     case, notes = with_curve(car[0], file, CurveOptions(accuracy=ACCURACY, **options))
     results = run([case], [Native()], tol=1e-12)
     return results.records[0], notes, results.suspects.get(case.name)
-
-
-FORMS = {
-    "in the heads": {},
-    "other names": {"head": "Wheel Travel (mm),Toe Angle_deg,Camber/deg"},
-    "below the heads": {"head": "Rig 3\nbump,toe,camber\nmm,deg,deg"},
-    "further columns": {
-        "head": "No,Load (N),stroke [mm],camber_left [deg],toe_in [deg],camber_right [deg],ok",
-        "form": "1,x,{0},{2},{1},,True",
-    },
-    "an exact name before a similar one": {
-        "head": "Travel [mm],toe_in [deg],toe [deg],camber_angle [deg],camber [deg]",
-        "form": "{0},9,{1},9,{2}",
-    },
-    "an exact name after a similar one": {
-        "head": "Travel [mm],toe [deg],toe_in [deg],camber [deg],camber_angle [deg]",
-        "form": "{0},{1},9,{2},9",
-    },
-    "blanks": {"head": "travel [mm]  toe (deg)  camber (deg)", "form": "{}   {} {}"},
-    "decimal points and semicolons": {"head": "travel;toe;camber\nmm;deg;°", "form": "{};{};{}"},
-}
 
 
 @pytest.mark.parametrize("kind", FORMS)
@@ -138,39 +120,6 @@ def test_slip_of_curve_is_named(tmp_path, car, change):
     record, _, suspect = judged(car, rig(tmp_path, SLIPS[change](car[1])))
     assert record.outcome is Outcome.FAIL
     assert f"the reference {change} fits" in suspect.message
-
-
-FAULTS = {
-    "unknown unit": ({"head": "travel [mm],toe [furlong],camber"}, {}, "'furlong' ... an angle"),
-    "another unit": ({"head": "travel [mm],toe [mm],camber"}, {}, "'mm' ... an angle: deg"),
-    "two units": ({"head": "travel [mm],toe_deg [rad],camber"}, {}, "in 'deg' and 'rad'"),
-    "two rows of units": (
-        {"head": "travel [mm],toe [deg],camber\nmm,rad,rad"},
-        {},
-        "in 'deg' and 'rad' ... one unit",
-    ),
-    "no unit": ({"head": "travel,toe,camber"}, {}, "43.7 ... without a unit ... travel [mm]"),
-    "no output": ({"head": "travel [mm],a,b"}, {}, "'a', 'b' ... --map"),
-    "two toes": ({"head": "travel [mm],toe_left,toe angle"}, {}, "'toe_left' and 'toe angle'"),
-    "other signs": ({"head": "# signs: sae_j670\ntravel [mm],toe,camber"}, {}, "--map ... -OUTPUT"),
-    "contradicting signs": (
-        {"head": "# signs: iso8855\ntravel [mm],toe,camber"},
-        {"signs": "sae_j670"},
-        "--signs: found sae_j670 ... 'iso8855'",
-    ),
-    "unknown signs": ({}, {"signs": "iso"}, "--signs ... iso8855"),
-    "no such column": ({}, {"columns": ["Spur=toe"]}, "--map: found no column 'Spur'"),
-    "no such output": ({}, {"columns": ["toe=tow"]}, "--map: found 'tow' ... 'toe'"),
-    "no equals": ({}, {"columns": ["toe"]}, "--map: found 'toe' ... COLUMN=OUTPUT"),
-    "stated unit contradicts": ({}, {"columns": ["toe=toe [rad]"]}, "in 'deg' and 'rad'"),
-    "accuracy of two units": (
-        {"head": "travel [mm],toe,half_track_change [mm]"},
-        {"accuracy": ["0.1"]},
-        '--accuracy ... toe, half_track_change ... "toe=0.1"',
-    ),
-    "accuracy of nothing": ({}, {"accuracy": ["caster=1 deg"]}, "'caster' ... with a column"),
-    "a gap": ({"form": "{},,{}"}, {}, "'toe [deg]' ... 0 numbers ... expected 4"),
-}
 
 
 @pytest.mark.parametrize("kind", FAULTS)

@@ -18,6 +18,7 @@ from kincheck.core.extensions.trees.tree import Spring
 from scipy.spatial.transform import Rotation
 
 from ...support import case_texts
+from ...support.examples import examples
 from ...support.model_files import driven
 from ...support.model_poses import EXACT, near, solution
 from ...support.model_poses import coordinate as since_design
@@ -32,6 +33,8 @@ from ...support.osim_texts import (
     texts,
 )
 from ...support.splines import through
+
+FAULTS, SLOTS, FORWARD, DOWN = examples(__file__, "faults", "slots", "forward", "down")
 
 DRIVE = driven("A:0:0.5:5")
 P = (0.1, 0.2, 0.3), (0.3, -0.2, 0.5)
@@ -61,16 +64,6 @@ def joined(motion):
     return transform(*P) @ motion @ BACK
 
 
-SLOTS = {
-    "PinJoint": [2],
-    "SliderJoint": [3],
-    "UniversalJoint": [0, 1],
-    "GimbalJoint": [0, 1, 2],
-    "BallJoint": [0, 1, 2],
-    "PlanarJoint": [2, 3, 4],
-    "FreeJoint": [*range(6)],
-    "WeldJoint": [],
-}
 """What coordinates are: turns about x, y, z, and displacements along them."""
 
 
@@ -162,16 +155,6 @@ def test_custom_joint_axes_follow_coordinates(write):
 
 # The knee of gait2392 of https://github.com/opensim-org/opensim-models (CC BY 3.0):
 # displacements of the shank [m] over the angle [rad].
-FORWARD = (
-    (-2.0944, -1.74533, -1.39626, -1.0472, -0.698132, -0.349066, -0.174533)
-    + (0.197344, 0.337395, 0.490178, 1.52146, 2.0944),
-    (-0.0032, 0.00179, 0.00411, 0.0041, 0.00212, -0.001, -0.0031)
-    + (-0.005227, -0.005435, -0.005574, -0.005435, -0.00525),
-)
-DOWN = (
-    (-2.0944, -1.22173, -0.523599, -0.349066, -0.174533, 0.159149, 2.0944),
-    (-0.4226, -0.4082, -0.399, -0.3976, -0.3966, -0.395264, -0.396),
-)
 
 
 def table(kind, x, y):
@@ -343,62 +326,6 @@ WHOLE = model(
     [*PINS[1:], custom(coordinate("q"), axis("rotation1", X, DOWN_SPLINE, "q"))],
     coupler("B", "C", line(1, 0)),
 )
-FAULTS = {
-    "ellipsoid": ("PinJoint", "EllipsoidJoint", "found 'EllipsoidJoint'"),
-    "constraint": (
-        "CoordinateCouplerConstraint",
-        "PointOnLineConstraint",
-        "is a PointOnLineConstraint, expected one of PointConstraint",
-    ),
-    "spline": (DOWN_SPLINE, "<GCVSpline/>", "is a GCVSpline, a curve for which there is no joint"),
-    "points": (
-        DOWN_SPLINE,
-        table("SimmSpline", (0, 1), (0, 1, 2)),
-        "<y>: found '0 1 2', expected 2",
-    ),
-    "order": (DOWN_SPLINE, table("SimmSpline", (0, 1, 1), (0, 1, 2)), "1.0 follows 1.0; the first"),
-    "corners": (
-        DOWN_SPLINE,
-        table("PiecewiseLinearFunction", (0, 1, 2), (0, 1, 0)),
-        "has corners, where velocities jump, expected points on one line; give a SimmSpline",
-    ),
-    "no axis": (
-        f"<coordinates>q</coordinates><axis>1 0 0</axis>{DOWN_SPLINE}",
-        "<coordinates/><axis>1 0 0</axis>",
-        "moves no axis of its joint, expected one",
-    ),
-    "frame": (
-        "/bodyset/b",
-        "/bodyset/d",
-        "socket_parent: found '/bodyset/d', expected a frame of the model",
-    ),
-    "itself": ("/bodyset/b", "/ground", "joins 'world' with itself"),
-    "coordinate": (
-        "<independent_coordinate_names>B",
-        "<independent_coordinate_names>X",
-        "independent_coordinate: found 'X', expected a coordinate",
-    ),
-    "twice": ('Coordinate name="C"', 'Coordinate name="B"', "found 'B' again"),
-    "mistyped": ("</default_value>", "</default_value><lockd/>", "did you mean 'locked'"),
-    "flag": (
-        "</default_value>",
-        "</default_value><locked>1</locked>",
-        "found '1', expected true or false",
-    ),
-    "numbers": (
-        "<translation>0.0 0.0 0.0",
-        "<translation>0 nan 0",
-        "<translation>: found '0 nan 0', expected 3 numbers",
-    ),
-    "ring": (
-        "<socket_parent>/bodyset/b",
-        "<socket_parent>on_child",
-        "by a ring of frames",
-    ),
-    "units": ("<Ground", "<length_units>mm</length_units><Ground", "expected meters"),
-    "version": ("40000", "4.5", "found '4.5', expected 40000 or more"),
-    "no model": ("Model", "Modell", "found no single <Model>"),
-}
 
 
 @pytest.mark.parametrize("fault", FAULTS)

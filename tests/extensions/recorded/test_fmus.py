@@ -10,6 +10,9 @@ import zipfile
 import pytest
 
 from ...support.crank import MECHANISM
+from ...support.examples import examples
+
+VARIABLES, SOURCE = examples(__file__, "variables", "source")
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 pytestmark = [
@@ -34,59 +37,6 @@ relative = false
 type = "joint_angle"
 joint = "pivot"
 """
-SOURCE = r"""
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-typedef double R;
-typedef struct { R time, turn, rate, sum, x; int steps; } M; /* a co-simulation moves in its steps alone */
-static M *made(int steps) { M *m = calloc(1, sizeof(M)); m->steps = steps; m->x = 500; return m; }
-static R value(M *m, unsigned k) {
-  R all[] = {m->time, m->turn, m->rate, m->steps ? m->x : 500 * cos(m->turn), m->sum, 500 * cos(0.7 * sin(2 * M_PI * m->time))};
-  return all[k];
-}
-static int set(M *m, const unsigned *k, size_t n, const R *x) {
-  for (size_t i = 0; i < n; i++) *(k[i] == 1 ? &m->turn : &m->rate) = x[i];
-  return 0;
-}
-static int get(M *m, const unsigned *k, size_t n, R *x) {
-  for (size_t i = 0; i < n; i++) x[i] = value(m, k[i]);
-  return 0;
-}
-static int step(M *m, R t, R h) { m->sum += h * m->rate; m->time = t + h; m->x = 500 * cos(m->turn); return 0; }
-void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, const void *c, int v, int l) { return made(k); }
-void fmi2FreeInstance(void *m) { free(m); }
-int fmi2SetupExperiment(void *m, int d, R tol, R t, int s, R e) { ((M *)m)->time = t; return 0; }
-int fmi2EnterInitializationMode(void *m) { return 0; }
-int fmi2ExitInitializationMode(void *m) { return 0; }
-int fmi2EnterContinuousTimeMode(void *m) { return 0; }
-int fmi2NewDiscreteStates(void *m, int *e) { memset(e, 0, 5 * sizeof(int)); return 0; }
-int fmi2Terminate(void *m) { return 0; }
-int fmi2SetTime(void *m, R t) { ((M *)m)->time = t; return 0; }
-int fmi2SetReal(void *m, const unsigned *k, size_t n, const R *x) { return set(m, k, n, x); }
-int fmi2GetReal(void *m, const unsigned *k, size_t n, R *x) { return get(m, k, n, x); }
-int fmi2DoStep(void *m, R t, R h, int p) { return step(m, t, h); }
-void *fmi3InstantiateCoSimulation() { return made(1); }
-void *fmi3InstantiateModelExchange() { return made(0); }
-void fmi3FreeInstance(void *m) { free(m); }
-int fmi3EnterInitializationMode(void *m, char d, R tol, R t, char s, R e) { ((M *)m)->time = t; return 0; }
-int fmi3ExitInitializationMode(void *m) { return 0; }
-int fmi3EnterContinuousTimeMode(void *m) { return 0; }
-int fmi3UpdateDiscreteStates(void *m, char *a, char *b, char *c, char *d, char *e, R *t) { *a = *b = *c = *d = *e = 0; return 0; }
-int fmi3Terminate(void *m) { return 0; }
-int fmi3SetTime(void *m, R t) { ((M *)m)->time = t; return 0; }
-int fmi3SetFloat64(void *m, const unsigned *k, size_t n, const R *x, size_t v) { return set(m, k, n, x); }
-int fmi3GetFloat64(void *m, const unsigned *k, size_t n, R *x, size_t v) { return get(m, k, n, x); }
-int fmi3DoStep(void *m, R t, R h, char p, char *a, char *b, char *c, R *last) { *a = *b = *c = 0; *last = t + h; return step(m, t, h); }
-"""  # noqa: E501
-VARIABLES = [
-    ("time", "independent", "s"),
-    ("angle", "input", "rad"),
-    ("rate", "input", "rad/s"),
-    ("x", "output", "mm"),
-    ("sum", "output", ""),
-    ("free_x", "output", "mm"),
-]
 
 
 def functions(fmi):

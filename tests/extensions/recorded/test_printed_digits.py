@@ -2,11 +2,14 @@
 fail.
 """
 
-import functools
 import json
 
 import numpy as np
 import pytest
+
+from ...support.examples import examples
+
+(REFUSED,) = examples(__file__, "refused")
 
 A, B, C, D = (np.array(x) for x in ((0, 0), (0.1, 0), (0.26875, 0.24803918541230535), (0.3, 0)))
 P = np.array([0.2, 0.1])
@@ -341,16 +344,6 @@ def test_json_lines_and_gaps_are_read(recorded):
     assert "nothing is recorded: x at 1 sample, y at 1 sample" in record["message"]
     records[6]["x"] *= 1.001
     assert recorded("\n".join(map(json.dumps, records)), name="run.ndjson")[0] == 1
-
-
-REFUSED = {
-    "several": ({"a": [{"turn": 0}], "b": [{"turn": 0}]}, "the tables 'a', 'b', expected one"),
-    "none": ({"a": 1}, "found no records, expected records such as"),
-    "empty": ([], "found no records"),
-    "lengths": ({"turn": [0, 1], "x": [0]}, "different lengths ('turn' 2, 'x' 1)"),
-    "text": ([{"turn": "a", "x": 1}], "column turn: found 'a', expected a finite number"),
-    "deep": (functools.reduce(lambda inner, _: {"a": inner}, range(30), 0), "more than 16 deep"),
-}
 
 
 @pytest.mark.parametrize("kind", REFUSED)

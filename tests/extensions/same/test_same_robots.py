@@ -18,6 +18,9 @@ from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
 
 from ...support.cut_models import FORMATS, LAWS, random_closed, written
+from ...support.examples import examples
+
+(CHANGES,) = examples(__file__, "changes")
 
 absent = {"OpenSim": "osim" not in extensions()}
 absent["USD"] = "usd" not in extensions() or importlib.util.find_spec("pxr") is None
@@ -113,21 +116,6 @@ TENDONS = """<mujoco><compiler angle="degree"/><worldbody>
 <spatial name="rope" stiffness="7" damping="1" springlength="0.5" range="0 2">
 <site site="s"/><site site="t"/></spatial>
 <fixed name="sum" stiffness="3"><joint joint="second" coef="1"/></fixed></tendon></mujoco>"""
-CHANGES = {
-    "range of a ball": ('range="0 40"', 'range="0 30"', "limit of the ball of first"),
-    "no range of a ball": ('range="0 40"', "", "lost in b.xml: limit of the ball of first"),
-    "spring of a ball": ('stiffness="2"', 'stiffness="5"', "stiffness of first: 2 against 5"),
-    "spring of a rope": ('stiffness="7"', 'stiffness="8"', "stiffness of rope: 7 against 8"),
-    "length of a rope": ('"0.5"', '"0.6"', "free length of rope: 0.5 against 0.6"),
-    "end of a rope": ('pos="0.1 0 0"', 'pos="0.2 0 0"', "ends of rope: 0.1 m apart"),
-    "limit of a rope": ('range="0 2"', 'range="0 3"', "range of tendon rope: 0 2 against 0 3"),
-    "spring of a sum": ('stiffness="3"', 'stiffness="4"', "stiffness of tendon sum: 3 against 4"),
-    "no sum": (
-        '<fixed name="sum" stiffness="3">',
-        '<fixed name="sum">',
-        "lost in b.xml: stiffness",
-    ),
-}
 
 
 @pytest.mark.parametrize(("old", "new", "text"), CHANGES.values(), ids=CHANGES)

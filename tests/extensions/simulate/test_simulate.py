@@ -27,8 +27,11 @@ from kincheck.core.harness.record import from_json
 from kincheck.core.harness.run import run
 
 from ...support.engine_motion import installed, mechanism_of, motion_case
+from ...support.examples import examples
 from ...support.loaded_slider_crank import pushed
 from ...support.mechanisms import ORIGIN, X, Y, Z, mcpherson
+
+(REFUSED,) = examples(__file__, "refused")
 
 
 def record(case, engine):
@@ -315,14 +318,6 @@ def test_simulated_gears_over_turns():
     assert record(gears(), installed("exudyn-static", "simulate")).outcome is Outcome.PASS
 
 
-COUPLED = "constant_velocity gear linear_coupler polynomial rack_pinion screw spline"
-EXUDYN = "constant_velocity polynomial revolute_spherical spline"
-REFUSED = {
-    **dict.fromkeys(("mujoco", "mujoco-default", "mujoco-projecting"), "spline"),
-    **dict.fromkeys(("pinocchio", "dart"), COUPLED),
-    **dict.fromkeys(("exudyn", "exudyn-alpha", "exudyn-static", "exudyn-static-modified"), EXUDYN),
-    **dict.fromkeys(("drake", "simbody"), "polynomial spline"),
-}
 """Joint and coupler types that simulators refuse; all others they simulate."""
 
 

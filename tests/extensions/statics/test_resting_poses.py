@@ -14,7 +14,10 @@ from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.native_engine import NativeEngine
 from scipy.optimize import brentq
 
+from ...support.examples import examples
 from ...support.fakes import record_of
+
+(PARALLEL,) = examples(__file__, "parallel")
 
 G = 9.81
 ARM = """
@@ -382,33 +385,6 @@ def test_moments_about_point_in_frames(tmp_path, engine):
         assert found[name] == pytest.approx(value, abs=1e-10)
     across = np.hypot(found["joint_x"], found["joint_y"])
     assert across == pytest.approx(0.1 * weight, abs=1e-10)
-
-
-PARALLEL = "".join(
-    f"""[bodies.{name}]
-mass = {mass}
-center_of_mass = {center}
-euler_parameters = {turn}
-"""
-    for name, mass, center, turn in (
-        ("crank", 2.0, [0.0, 0.0, 0.5], [1.0, 0.0, 0.0, 0.0]),
-        ("rod", 3.0, [1.0, 0.0, 1.0], [0.8, 0.6, 0.0, 0.0]),
-        ("rocker", 2.0, [2.0, 0.0, 0.5], [1.0, 0.0, 0.0, 0.0]),
-    )
-) + "".join(
-    f"""[joints.{name}]
-type = "revolute"
-bodies = ["{i}", "{j}"]
-point = [{x}, 0.0, {z}]
-axis = [0.0, 1.0, 0.0]
-"""
-    for name, i, j, x, z in (
-        ("a", "ground", "crank", 0.0, 0.0),
-        ("b", "crank", "rod", 0.0, 1.0),
-        ("c", "rod", "rocker", 2.0, 1.0),
-        ("d", "ground", "rocker", 2.0, 0.0),
-    )
-)
 
 
 def test_redundant_rows_leave_turned_components_undetermined(tmp_path):

@@ -21,6 +21,10 @@ from kincheck.core.harness.execution import Answer, Pair, attempt
 from kincheck.core.joints import Kind
 from kincheck.core.kinematics import placed, places
 
+from ...support.examples import examples
+
+(WRONG,) = examples(__file__, "wrong")
+
 CLOSE = 1e-12
 VEHICLE = {"wheelbase": "2.6", "cg_height": "0.5", "brake_share": "0.6", "rack_per_turn": "0.05"}
 
@@ -234,19 +238,6 @@ def test_design_out_of_reach_says_why(corner):
     assert found.messages[1]
     for each in (found.values, found.slopes):
         assert np.isnan(each["toe"][1][~found.solved[1]]).all()
-
-
-WRONG = {
-    "row without an axis": ((["tierod_inner"], [[0.0]]), "'tierod_inner x', y or z"),
-    "no such row": ((["tierod_iner z"], [[0.0]]), "did you mean 'tierod_inner'"),
-    "one name alone": (("tierod_inner z", [[0.0]]), "expected a list of names"),
-    "nothing to vary": (([], [[]]), "names nothing to vary"),
-    "one place twice": ((["tierod_inner z"] * 2, [[0.0, 0.0]]), "'tierod_inner z' twice"),
-    "one row": ((["tierod_inner z"], [0.0]), r"shape (1,), expected (designs, 1)"),
-    "not finite": ((["tierod_inner z"], [[np.nan]]), "give finite numbers"),
-    "no such output": ((["tierod_inner z"], [[0.0]], ["tow"]), "there is no output 'tow'"),
-    "no such slope": ((["tierod_inner z"], [[0.0]], ["toe"], ["tow"]), "there is no output 'tow'"),
-}
 
 
 @pytest.mark.parametrize(("arguments", "said"), WRONG.values(), ids=WRONG)

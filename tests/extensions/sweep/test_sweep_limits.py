@@ -35,8 +35,11 @@ from kincheck.core.mechanism.motions import JointAngle
 from scipy import stats
 
 from ...report.page import Page
+from ...support.examples import examples
 from ...support.fakes import crank, swept
 from ...support.variations import HEAD, vary, vary_file
+
+LOADED, REMARKS = examples(__file__, "loaded", "remarks")
 
 TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
 
@@ -97,19 +100,8 @@ def test_sweep_page_has_limits_and_histograms(found):
 
 @pytest.mark.parametrize(
     ("changes", "said", "told"),
-    [
-        ({}, "a Sobol sequence is balanced", False),
-        ({"asked": 4097}, "4097 is none, so the means converge more slowly: 8192 would be", True),
-        ({"asked": 4097, "sampling": "random"}, "Sobol", False),
-        ({"unsolved": 10}, "in all", False),
-        ({"unsolved": 11}, "unsolved: 11 in all, the first 0 in the results", True),
-        ({}, "assumes independent variants; for sobol sampling it is usually too wide", True),
-        ({"sampling": "random"}, "assumes independent variants", False),
-    ],
-    ids=[
-        *("power of two", "no power of two", "random", "few unsolved", "many unsolved"),
-        *("sobol interval", "random interval"),
-    ],
+    REMARKS.values(),
+    ids=REMARKS,
 )
 def test_study_remarks(found, changes, said, told):
     results = msgspec.structs.replace(found, **changes)
@@ -423,17 +415,6 @@ def test_sweep_command_counts_incomplete_variants(tmp_path, capsys, option, judg
 
 COUNT = 4
 # The rows of the slider-crank are redundant: some components are not determined.
-LOADED = {
-    "planar_slider_crank": {
-        "pin": {"at": "joints.crank_pin.point", "half_width": [0.5, 0.5, 0.0]},
-        "mass": {"at": "bodies.slider.mass", "half_width": 0.1},
-    },
-    "mcpherson_strut_loaded": {
-        "rate": {"at": "forces.spring.stiffness", "half_width": 2.0},
-        "mass": {"at": "bodies.knuckle.mass", "half_width": 3.0},
-        "ball": {"at": "ball", "sigma": 1.0},
-    },
-}
 
 
 @pytest.mark.parametrize("name", LOADED)

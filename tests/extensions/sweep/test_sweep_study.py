@@ -34,18 +34,15 @@ from kincheck.core.jet import Jet
 from kincheck.primitives import Dot10
 from scipy import stats
 
+from ...support.examples import examples
 from ...support.fakes import crank, exact, swept
 from ...support.measure_cases import arm
 from ...support.variations import vary
 
+TIP_LAWS, STRUT = examples(__file__, "tip_laws", "strut")
+
 TIP = {"at": "tip", "sigma": [1.0, 2.0, 0.0]}
 PIVOT = {"at": "pivot", "half_width": [0.0, 5.0, 0.0]}
-STRUT = {
-    "tie_rod_outer": {"at": "joints.tie_rod.points.0", "sigma": 1.0},
-    "ball": {"at": "ball", "sigma": 1.0},
-    "wheel_center": {"at": "wheel_center", "half_width": 2.0},
-    "pivot_axis": {"at": "joints.lca_pivot.axis", "sigma": 0.1},
-}
 
 
 def cranks(case, variation, seed, count):
@@ -419,19 +416,6 @@ def test_untraced_forces_have_no_gradients(tmp_path, monkeypatch):
 
 
 # Distributions, samplings and correlations of drawn variants, held against scipy's
-
-
-TIP_LAWS = {
-    "normal": {"at": "tip", "sigma": [0.0, 2.0, 0.0]},
-    "truncated_normal": {
-        "at": "tip",
-        "sigma": [0.0, 2.0, 0.0],
-        "half_width": 3.0,
-        "distribution": "truncated_normal",
-    },
-    "uniform": {"at": "tip", "half_width": [0.0, 2.0, 0.0]},
-    "triangular": {"at": "tip", "half_width": [0.0, 2.0, 0.0], "distribution": "triangular"},
-}
 
 
 @pytest.fixture

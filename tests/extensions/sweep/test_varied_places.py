@@ -21,8 +21,11 @@ from kincheck.core.extensions.sweep.variation_file import read_variation
 from kincheck.core.extensions.sweep.varied_places import Geometry
 from kincheck.core.kinematics import placed
 
+from ...support.examples import examples
 from ...support.rods_of_templates import solved
 from ...support.variations import moved, vary, vary_file
+
+(FAULTS,) = examples(__file__, "faults")
 
 CAR = {"cg_height": "0.5", "wheelbase": "2.6", "brake_share": "0.6", "position": "front"}
 CORNER = Supplied(travel="0.04:3", **CAR)
@@ -208,24 +211,6 @@ def test_row_by_role_joint_or_place(tmp_path, at):
     numbers = {each.number for each in diagnose(case, samples=1, tol=1e-12).sensitivities}
     assert {"Kugel x", "lca_front z"} <= numbers
     assert not any("." in number for number in numbers)
-
-
-FAULTS = [
-    ({"a": {"at": "lca_frnt", "sigma": 1.0}}, "did you mean 'lca_front'?"),
-    (
-        {"a": {"at": "lca_outer", "sigma": 1.0}, "b": {"at": "lower_ball", "sigma": 1.0}},
-        "hardpoints.b: moves joints.lower_ball.point, as does hardpoints.a",
-    ),
-    (
-        {"a": {"at": "points.wheel_axis.position", "sigma": 1.0}},
-        "which follows from wheel_center and wheel_axis, expected one of these. Name it",
-    ),
-    ({"a": {"at": "damper_lower", "sigma": 1.0}}, "which nothing of the case follows"),
-    (
-        {"a": {"at": "lca_front", "sigma": 1.0, "only": ["joints.lca_pivot.point"]}},
-        "which does not follow lca_front at design; expected some of joints.lca_pivot.axis",
-    ),
-]
 
 
 @pytest.mark.parametrize(("points", "message"), FAULTS)

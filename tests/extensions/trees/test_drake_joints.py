@@ -8,16 +8,12 @@ from kincheck.core.case.models.files import load
 from scipy.spatial.transform import Rotation
 
 from ...support.case_texts import complains, write
+from ...support.examples import examples
 from ...support.model_files import driven
 from ...support.model_poses import EXACT, solution
 from .test_joining_elements import GATE
 
-JOINTS_OF_DRAKE = {
-    "ball": ("", "", 0),
-    "universal": ("", "q.2", 2),
-    "planar": ('<axis xyz="0 1 0"/>', "q.rotation", 3),
-    "screw": ('<axis xyz="0 0 1"/><drake:screw_thread_pitch value="0.5"/>', "q.rotation", 1),
-}
+(JOINTS_OF_DRAKE,) = examples(__file__, "joints_of_drake")
 
 
 def assert_stands_as_in_drake(file, link, values, motion, base="world"):

@@ -17,8 +17,16 @@ from kincheck.core.extensions.xml.element import parse_xml
 from kincheck.core.harness.compare import output_series
 
 from ...support.case_texts import complains, refused, write
+from ...support.examples import examples
 from ...support.model_files import driven, edited
 from ...support.model_poses import EXACT, coordinate, solution
+
+LOOPS, JOINING, JOINING_IN_SDF, JOINING_IN_MJCF, APART, WITHOUT = examples(
+    __file__, "loops", "joining", "joining_in_sdf", "joining_in_mjcf", "apart", "without"
+)
+MISTYPED, MISTYPED_IN_URDF, MISTYPED_IN_MJCF = examples(
+    __file__, "mistyped", "mistyped_in_urdf", "mistyped_in_mjcf"
+)
 
 DRIVE = driven("drive:-0.2:0.2:5", hold_rest=True)
 HINGE = '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/>{}</joint>'
@@ -73,33 +81,6 @@ def follower_angles() -> np.ndarray:
     return np.angle(-0.1 + 0.45j) - np.angle(end)
 
 
-AT = "<pose>-0.1 0 0.45 0 0 0</pose>"
-ENDS = "<parent>strut</parent><child>follower</child>"
-BALL = (
-    "<drake:ball_constraint>"
-    '<drake:ball_constraint_body_A name="strut"/><drake:ball_constraint_body_B name="follower"/>'
-    '<drake:ball_constraint_p_AP value="0.3 0 0.2"/>'
-    '<drake:ball_constraint_p_BQ value="-0.1 0 0.45"/></drake:ball_constraint>'
-)
-LOOPS = {
-    "hinge": f'<gazebo><joint name="c" type="revolute">{ENDS}{AT}<axis><xyz>0 1 0</xyz></axis>'
-    "</joint></gazebo>",
-    "hinge, axis in another link": f'<gazebo><joint name="c" type="revolute">{ENDS}{AT}'
-    '<axis><xyz expressed_in="base">0 1 0</xyz></axis></joint></gazebo>',
-    "ball on a frame": '<gazebo><frame name="end" attached_to="follower">'
-    '<pose relative_to="pivot">-0.1 0 0.45 0 0 0</pose></frame>'
-    '<joint name="c" type="ball"><parent>strut</parent><child>end</child></joint></gazebo>',
-    "loop_joint with an axis": '<loop_joint name="c" type="continuous"><axis xyz="0 1 0"/>'
-    '<link1 link="strut" xyz="0.3 0 0.2"/><link2 link="follower" xyz="-0.1 0 0.45"/></loop_joint>',
-    "loop_joint of Isaac Sim": '<loop_joint name="c" type="spherical">'
-    '<link1 link="strut" rpy="0 0 0" xyz="0.3 0 0.2"/>'
-    '<link2 link="follower" rpy="0.1 0 0" xyz="-0.1 0 0.45"/></loop_joint>',
-    "Drake's ball": BALL,
-    "Drake's balls on an axis": BALL
-    + BALL.replace('"0.3 0 0.2"', '"0.3 1 0.2"').replace('"-0.1 0 0.45"', '"-0.1 1 0.45"'),
-}
-
-
 @pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS)
 def test_gazebo_or_drake_loop_closes(loop, tmp_path):
     case = read_inside(tmp_path, loop)
@@ -118,110 +99,6 @@ def test_tilted_loop_hinge_is_open(tilt, tmp_path):
 
 
 TWO = "names the links 'strut' and 'follower', which it may join, and is not read, expected a"
-COUPLED = "couples the joints 'drive' and 'pivot', and is not read, expected <mimic>"
-JOINING = {
-    "attributes": ('<tie a="strut" b="follower"/>', TWO),
-    "children": ('<tie><parent link="strut"/><child link="follower"/></tie>', TWO),
-    "texts": ("<x><a>strut</a><b>follower</b></x>", TWO),
-    "a list": ('<tie links="strut, follower"/>', TWO),
-    "depth": ('<x><y><z><a name="strut"/><b name="follower"/></z></y></x>', TWO),
-    "prefix": ('<any:weld body1="strut" body2="follower"/>', TWO),
-    "plugin": (f'<gazebo><plugin name="p" filename="f">{ENDS}</plugin></gazebo>', TWO),
-    "reference": ('<gazebo reference="strut"><attach>follower</attach></gazebo>', TWO),
-    "joint of a reference": (
-        f'<gazebo reference="strut"><joint name="w" type="ball">{ENDS}</joint></gazebo>',
-        TWO,
-    ),
-    "frames": (
-        '<frame name="f" link="strut"/><frame name="g" link="follower"/><drake:damper>'
-        '<drake:frameA name="f"/><drake:frameC name="g"/></drake:damper>',
-        TWO,
-    ),
-    "the world": ('<close link="strut" to="world"/>', "names the links 'strut' and 'world'"),
-    "MuJoCo's": (
-        '<mujoco><equality><connect body1="strut" body2="follower"/></equality></mujoco>',
-        TWO,
-    ),
-    "a name alone": ('<joint_loop name="closing"/>', "may close a loop, and is not read"),
-    "mimic plugin": (
-        '<gazebo><plugin name="m" filename="libmimic_joint.so"><joint>drive</joint>'
-        "<mimicJoint>pivot</mimicJoint></plugin></gazebo>",
-        COUPLED,
-    ),
-    "mimic of ros2_control": (
-        '<ros2_control><joint name="drive"/><joint name="pivot"><param name="mimic">drive</param>'
-        "</joint></ros2_control>",
-        COUPLED,
-    ),
-    "one motor for two joints": (
-        '<transmission name="t"><joint name="drive"/><joint name="pivot"/><actuator name="m"/>'
-        "</transmission>",
-        "with fewer actuators than joints may couple 'drive' and 'pivot'",
-    ),
-    "another joint of Drake": (
-        '<link name="t"/><drake:joint name="q" type="curvilinear"><parent link="strut"/>'
-        '<child link="t"/></drake:joint>',
-        "found 'curvilinear', expected one of ball, planar, screw, universal",
-    ),
-    "a gear": (
-        '<drake:gearbox ratio="2"><drake:joint1>drive</drake:joint1><drake:joint2>pivot'
-        "</drake:joint2></drake:gearbox>",
-        COUPLED,
-    ),
-    "names with their models": ('<x:weld from="gate::strut" to="/follower"/>', TWO),
-    "a screw without pitch": (
-        '<link name="t"/><drake:joint name="q" type="screw"><parent link="strut"/>'
-        '<child link="t"/></drake:joint>',
-        "<drake:screw_thread_pitch>: missing",
-    ),
-    "a joint that moves the base": (
-        '<gazebo><joint name="w" type="revolute"><parent>world</parent><child>base</child><axis/>'
-        "</joint></gazebo>",
-        "'w' moves 'base', the base, which stands still",
-    ),
-    "a loop_joint without its axis": (
-        '<loop_joint type="revolute"><link1 link="strut"/><link2 link="follower"/></loop_joint>',
-        "<axis>: missing for 'revolute', expected one axis",
-    ),
-    "a bushing of another kind": (
-        '<drake:linear_bushing_rpy><drake:bushing_frameA name="strut"/>'
-        '<drake:bushing_frameC name="follower"/></drake:linear_bushing_rpy>',
-        "<drake:bushing_force_stiffness>: missing, expected three numbers",
-    ),
-    "an unknown element": (
-        '<cam_plan a="1"/>',
-        "unknown in <robot> (--without cam_plan leaves it out)",
-    ),
-    "a mistyped reference": (
-        '<gazebo refrence="strut"><mu1>1</mu1></gazebo>',
-        "did you mean 'reference'?",
-    ),
-    "a link of SDF": ('<gazebo><link name="z"/></gazebo>', "is of SDF, expected links of URDF"),
-}
-JOINING_IN_SDF = {
-    "plugin": '<plugin name="DetachableJoint"><parent_link>strut</parent_link>'
-    "<child_link>follower</child_link></plugin>",
-    "scoped": '<plugin name="p"><a>gate::strut</a><b>follower</b></plugin>',
-    "gripper": "<gripper><palm_link>strut</palm_link><gripper_link>follower</gripper_link>"
-    "</gripper>",
-    "mistyped": "<drake:ball_constrant><a>strut</a><b>follower</b></drake:ball_constrant>",
-    "unknown": '<loop a="strut" b="follower"/>',
-}
-JOINING_IN_MJCF = {
-    "plugin": (
-        '<extension><plugin plugin="p"><config key="i" value="a"/><config key="j" value="b"/>'
-        "</plugin></extension>",
-        "names the links 'a' and 'b', which it may join",
-    ),
-    "soft body": (
-        '<deformable><flex name="f" body="a b"/></deformable>',
-        "holds the bodies a, b together as a soft one",
-    ),
-    **{
-        kind: (f"<equality><{kind}/></equality>", "cannot be read: there is no joint for it")
-        for kind in ("flex", "flexvert", "flexstrain", "distance")
-    },
-}
 JOINING_IN = {
     "gate.urdf": JOINING,
     "gate.sdf": {kind: (text, TWO) for kind, text in JOINING_IN_SDF.items()},
@@ -250,28 +127,6 @@ def test_element_joining_links_is_refused(name, kind, tmp_path):
 def test_link_naming_another_is_refused(link, tmp_path):
     text = GATE.format("").replace('<link name="strut"/>', link)
     refused(lambda: read(tmp_path, text), TWO)
-
-
-APART = {
-    "looks and contacts": '<gazebo reference="strut"><material>Gazebo/Blue</material><mu1>1</mu1>'
-    "</gazebo>",
-    "plugins of one link each": '<gazebo><plugin name="x"><bodyName>strut</bodyName></plugin>'
-    '<plugin name="y"><bodyName>follower</bodyName></plugin></gazebo>',
-    "publishers": '<gazebo><plugin name="p" filename="libgazebo_ros_p3d.so">'
-    "<bodyName>strut</bodyName><frameName>base</frameName></plugin></gazebo>",
-    "motors": '<gazebo><plugin name="d" filename="libdrive.so"><leftJoint>drive</leftJoint>'
-    "<rightJoint>pivot</rightJoint></plugin></gazebo>",
-    "sensors": '<gazebo reference="strut"><sensor name="s"><frame>follower</frame></sensor>'
-    "</gazebo>",
-    "ros2_control": '<ros2_control name="s"><hardware><plugin>a/B</plugin></hardware>'
-    '<joint name="drive"/><joint name="pivot"/></ros2_control>',
-    "as many motors": '<transmission name="t"><joint name="drive"/><joint name="pivot"/>'
-    '<actuator name="m"/><actuator name="n"/></transmission>',
-    "collisions": '<drake:collision_filter_group name="g"><drake:member link="strut"/>'
-    '<drake:member link="follower"/></drake:collision_filter_group>'
-    '<disable_collisions link1="strut" link2="follower"/>',
-    "settings": '<mujoco><compiler meshdir="x"/></mujoco><drake:note/>',
-}
 
 
 @pytest.mark.parametrize("text", APART.values(), ids=APART)
@@ -386,63 +241,6 @@ def test_drake_bushing_forces_match_drake(tmp_path):
         assert found == pytest.approx(-np.array(expected), abs=1e-7)
 
 
-MISTYPED = {
-    "axis": ("<xyz>0 1 0</xyz>", "<xzy>0</xzy>", "unknown in <axis>; did you mean 'xyz'?"),
-    "frame of an axis": ("<xyz>", '<xyz expresed_in="x">', "did you mean 'expressed_in'"),
-    "pose": ("<pose>", '<pose relative="x">', "did you mean 'relative_to'?"),
-    "pose of a link": ("<pose>", "<pse>0</pse><pose>", "unknown in <link>; did you mean 'pose'"),
-    "joint": ("<parent>", "<offset>1</offset><parent>", "unknown in <joint>"),
-    "type": ('"drive" type', '"drive" tpe', "did you mean 'type'?"),
-    "mimic": ("<parent>", '<drake:mimc joint="x"/><parent>', "did you mean 'mimic'?"),
-    "model": ('name="gate"', 'name="gate" placement_fram="x"', "did you mean 'placement_frame'?"),
-    "parent": ("<parent>", '<parent also="strut">', "the attribute 'also'"),
-    "mass": (
-        "<pose>",
-        "<inertial><mas>1</mas></inertial><pose>",
-        "unknown in <inertial>; did you mean 'mass'",
-    ),
-    "inertia": ("<pose>", "<inertial><inertia><ixxx/></inertia></inertial><pose>", "'ixx'"),
-    "damping": ("</xyz>", "</xyz><dynamics><dampin>1</dampin></dynamics>", "'damping'"),
-}
-
-
-MISTYPED_IN_URDF = {
-    "axis": ('<axis xyz="0 1 0"/>', '<axis xzy="0 1 0"/>', "did you mean 'xyz'?"),
-    "origin": ('<origin xyz="0 0', '<origin degrees="1" xyz="0 0', "'degrees'"),
-    "joint": ('<parent link="base"/>', '<parent link="base"/><pose/>', "unknown in <joint>"),
-    "parent": ('<parent link="base"/>', '<parent link="base" offset="1"/>', "'offset'"),
-    "type": ('"drive" type', '"drive" tpe', "did you mean 'type'?"),
-    "mass": (
-        '<link name="strut"/>',
-        '<link name="strut"><inertial><mass vaule="1"/></inertial></link>',
-        "did you mean 'value'?",
-    ),
-    "inertial": (
-        '<link name="strut"/>',
-        '<link name="strut"><inertial><com xyz="1 0 0"/></inertial></link>',
-        "unknown in <inertial>",
-    ),
-    "damping": (
-        '<parent link="base"/>',
-        '<parent link="base"/><dynamics damp="1"/>',
-        "did you mean 'damping'?",
-    ),
-    "leader": (
-        '<parent link="base"/>',
-        '<parent link="base"/><mimic joint="drve"/>',
-        "did you mean 'drive'?",
-    ),
-}
-
-
-MISTYPED_IN_MJCF = {
-    "option": ("gravity", "gravty", "did you mean 'gravity'?"),
-    "default": ("density", "desity", "did you mean 'density'?"),
-    "inertial": ("diaginertia", "diaginertial", "did you mean 'diaginertia'?"),
-    "geom": ('name="g" size', 'name="g" mas', "did you mean 'mass'?"),
-}
-
-
 def test_mjcf_exclusions_and_sensors_join_nothing(tmp_path):
     case = read_inside(tmp_path, "", "model.xml")
     assert "contact: exclude (1), sensor: framepos (1)" in case.source
@@ -500,14 +298,6 @@ def test_all_attributes_of_mujoco_are_accepted(tmp_path):
             whole = f"<worldbody><body>{whole}</body></worldbody>"
         require_known_attributes(parse_xml(tmp_path / "m.xml", f"<mujoco>{whole}</mujoco>"))
     assert len(found["mujoco/body/geom"]) > 30
-
-
-WITHOUT = {
-    "a tag": ('<tie a="strut" b="follower"/>', "tie", "line 1: <tie>"),
-    "a name": (f'<gazebo><plugin name="p" filename="f">{ENDS}</plugin></gazebo>', "p", "'p'"),
-    "a tag and a name": ('<tie name="k" a="strut" b="follower"/>', "tie/k", "<tie> 'k'"),
-    "what is read": (BALL, "drake:ball_constraint", "<drake:ball_constraint>"),
-}
 
 
 @pytest.mark.parametrize(("text", "name", "said"), WITHOUT.values(), ids=WITHOUT)

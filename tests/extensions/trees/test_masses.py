@@ -15,7 +15,10 @@ from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.body import inertia_matrix
 
 from ...support.case_texts import complains, write
+from ...support.examples import examples
 from ...support.model_files import driven, edited
+
+(SETTINGS,) = examples(__file__, "settings")
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -41,15 +44,6 @@ WEIGHED = """<mujoco><compiler boundmass="0.01" boundinertia="0.001" balanceiner
 <body name="f"><joint type="slide"/><geom size="1" mass="0"/><geom size="1" group="4"/><geom size="2" group="7"/>
   <site pos="1 0 0"/></body>
 </worldbody></mujoco>"""  # noqa: E501
-SETTINGS = {
-    "auto": "",
-    "first groups": '<compiler inertiagrouprange="0 2"/>',
-    "geoms alone": '<compiler inertiafromgeom="true"/>',
-    "bounds": '<compiler boundmass="3" boundinertia="4"/>',
-    "no geoms": '<compiler inertiafromgeom="false" boundinertia="0.1"/>',
-    "all groups": '<compiler inertiagrouprange="0 5"/>',
-    "<inertial> where no group": '<compiler inertiafromgeom="true" inertiagrouprange="1 2"/>',
-}
 
 
 @pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)

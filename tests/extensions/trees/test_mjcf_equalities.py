@@ -5,8 +5,11 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 
+from ...support.examples import examples
 from ...support.mjcf_models import agree, closes_in_mujoco, model
 from ...support.model_files import driven
+
+(EQUALITIES,) = examples(__file__, "equalities")
 
 
 # A crank with a slide on it, whose end rides on the ground; the equality under test closes it.
@@ -34,32 +37,6 @@ def linkage(equality, more=""):
 
 
 EVERYTHING = ("crank", "pivot", "reach", "lever", "out", "cross_1", "cross_2")
-EQUALITIES = {
-    "connect": ('<connect body1="end" body2="lever" anchor="0.1 0 0"/>', "pivot reach"),
-    "connect to the ground": ('<connect body1="end" anchor="0.1 0 0"/>', "pivot reach"),
-    "weld": ('<weld body1="end" body2="lever" anchor="0.1 0 0"/>', "pivot reach lever"),
-    "gear": ('<joint joint1="lever" joint2="crank" polycoef="0 -0.7"/>', "lever"),
-    "gear of one": ('<joint joint1="lever" joint2="crank" polycoef="0"/>', "lever"),
-    "hinge by slide": ('<joint joint1="lever" joint2="reach" polycoef="0 4 0 0 0"/>', "lever"),
-    "slide by hinge": ('<joint joint1="out" joint2="crank" polycoef="0 0.3"/>', "out"),
-    "two slides": ('<joint joint1="out" joint2="reach" polycoef="0 -0.6"/>', "out"),
-    "locked": ('<joint joint1="pivot"/>', "pivot"),
-    "locked by nought": ('<joint joint1="pivot" joint2="crank" polycoef="0 0"/>', "pivot"),
-    "tendon": ('<tendon tendon1="sum"/>', "lever"),
-    "tendon of one": ('<tendon tendon1="one"/>', "lever"),
-    "two tendons": ('<tendon tendon1="sum" tendon2="one" polycoef="0 0.5"/>', "lever"),
-    "tendon of three": ('<tendon tendon1="three"/>', "lever"),
-    "tendons of four": (
-        '<tendon tendon1="three" tendon2="both" polycoef="0 0.4"/>',
-        "lever",
-    ),
-    "rod": ('<tendon tendon1="length"/>', "lever"),
-    "locked, whatever the coefficients of nothing": (
-        '<joint joint1="lever" polycoef="0 1 2"/>',
-        "lever",
-    ),
-    "tendon of slides": ('<tendon tendon1="both"/>', "out"),
-}
 
 
 @pytest.mark.by_day(3)

@@ -10,9 +10,12 @@ from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.exports.command import keep_texts
 
+from ...support.examples import examples
 from ...support.mjcf_models import agree, closes_in_mujoco, model
 from ...support.model_files import DRIVEN, GRIPPER, SPRINGS, driven
 from ...support.model_poses import EXACT, solution
+
+(ORIENTATIONS,) = examples(__file__, "orientations")
 
 
 def test_gripper_closes_in_mujoco():
@@ -40,21 +43,6 @@ def test_left_out_elements_are_listed():
     listed = load(GRIPPER, DRIVEN).source.split(LEFT_OUT)[1].split(", ")
     lost = "ranges of joints (8)", "armature of joints (2)"
     assert {*lost, "tendon: fixed (1)", "actuator: general (1)"} <= {*listed}
-
-
-ORIENTATIONS = {
-    "quaternion, not normalised": 'quat="1 2 -0.5 0.3"',
-    "axis and angle": 'axisangle="1 2 3 40"',
-    "two axes, not square": 'xyaxes="1 0.2 0 -0.1 2 0.4"',
-    "two axes, half a turn": 'xyaxes="-1 0 0 0 -1 0"',
-    "two axes, half a turn about x": 'xyaxes="1 0 0 0 -1 0"',
-    "two axes, half a turn about y": 'xyaxes="-1 0 0 0 1 0"',
-    "z axis": 'zaxis="1 -2 0.5"',
-    "z axis as it is": 'zaxis="0 0 3"',
-    "z axis opposite": 'zaxis="0 0 -2"',
-    "Euler angles": 'euler="20 -30 50"',
-    "none": "",
-}
 
 
 @pytest.mark.parametrize("angle", ["degree", "radian"])

@@ -9,9 +9,12 @@ from kincheck.core.extensions.trees.driving import read_start
 from kincheck.core.extensions.trees.reader import read_tree
 
 from ...support.case_texts import complains, refused
+from ...support.examples import examples
 from ...support.mjcf_models import agree, model, mujoco, stands_as
 from ...support.model_files import driven
 from ...support.model_poses import EXACT, near, solution
+
+START_FAULTS, RODS, INCLUDES = examples(__file__, "start_faults", "rods", "includes")
 
 ALL_KINDS = """<mujoco><compiler angle="degree" eulerseq="zyx"/><worldbody>
   <body name="base" pos="1 2 3" euler="10 20 30"><freejoint name="root"/>
@@ -43,18 +46,6 @@ def test_start_pose_matches_mujoco(tmp_path, said):
     assert near([*there.sites["tip"][1].at], data.site("tip").xpos)
     for name in ("turn", "push", "lone"):
         assert there.joints[name].value == pytest.approx(data.joint(name).qpos[0], abs=EXACT)
-
-
-START_FAULTS = {
-    "keyframe:bend": "'keyframe:bend' ... did you mean 'bent'?",
-    "keyframe:bent keyframe:0": "2 keyframes",
-    "push=far": "'far' for 'push' ... 1 finite number",
-    "wrist=1,0,0": "a ball joint ... 4 finite numbers",
-    "wrist=0,0,0,0": "quaternion of 'wrist' is zero",
-    "pull=1": "'pull' ... expected a joint; ",
-    "push": "say the value",
-    "push=1 push=2": "twice",
-}
 
 
 @pytest.mark.parametrize("start", START_FAULTS)
@@ -150,20 +141,6 @@ def test_two_joints_driven_together(tmp_path):
     complains(tmp_path / "model.xml", said, driven("one:0:1:5", "two:0:1:7", hold_rest=True))
 
 
-RODS = {
-    "ball and connect": (
-        '<body name="rod"><joint name="b" type="ball"/></body>',
-        '<connect body1="rod" body2="slider" anchor="0.8 0 -0.3"/>',
-    ),
-    "free body": ("", '<connect body1="free" anchor="0 0 0" body2="crank"/>'
-     '<connect body1="free" body2="slider" anchor="0.8 0 -0.3"/>'),
-    "with a tendon on its line": (
-        '<body name="rod"><joint name="b" type="ball"/><site name="mid" pos="0.4 0 -0.15"/></body>',
-        '<connect body1="rod" body2="slider" anchor="0.8 0 -0.3"/>',
-    ),
-}  # fmt: skip
-
-
 @pytest.mark.parametrize("kind", RODS)
 def test_rod_between_balls_does_not_spin(tmp_path, kind):
     inside, equality = RODS[kind]
@@ -222,18 +199,6 @@ def test_include_from_folder_beside_model(tmp_path):
     text = '<mujoco><worldbody><include file="../scene/part.xml"/></worldbody></mujoco>'
     tree = read_tree(model(tmp_path / "leg", text))
     assert [*tree.joints] == ["j"]
-
-
-OUTSIDE = "in the folder of the model"
-INCLUDES = {
-    "../../outside.xml": "'../../outside.xml' ... in the folder of the model, in one beside",
-    "../notes.txt": OUTSIDE,
-    "/etc/hostname": OUTSIDE,
-    "": OUTSIDE,
-    "gone.xml": "no such file",
-    "model.xml": "again ... once",
-    "link.xml": OUTSIDE,
-}
 
 
 @pytest.mark.parametrize("include", INCLUDES)

@@ -13,9 +13,12 @@ from kincheck.core.extensions.same.verdict import compare
 from kincheck.core.extensions.trees.reader import read_tree
 
 from ...support.case_texts import complains, refused, write
+from ...support.examples import examples
 from ...support.model_files import driven, edited
 from ...support.model_poses import EXACT, coordinate, near, solution
 from .fuzz import sdf as seeds
+
+FAULTS, AXES, NOT_INCLUDED = examples(__file__, "faults", "axes", "not_included")
 
 DRIVE = driven("A:0:0.5:5")
 FOUR_BAR = seeds.FOUR_BAR.decode()
@@ -87,21 +90,6 @@ def test_universal_joint_with_links_exchanged(tmp_path):
     assert found.verdict == "same", found.reason
 
 
-AXES = {
-    "in the joint": ("1.7", "<xyz>1 0 0</xyz>", (0, 1, 0)),
-    "in a link": ("1.7", '<xyz expressed_in="a">1 0 0</xyz>', (0, 0, -1)),
-    "in the model": ("1.7", '<xyz expressed_in="__model__">1 0 0</xyz>', (1, 0, 0)),
-    "in the world": ("1.7", '<xyz expressed_in="world">1 0 0</xyz>', (1, 0, 0)),
-    "in the model, by a flag": (
-        "1.6",
-        "<xyz>1 0 0</xyz><use_parent_model_frame>1</use_parent_model_frame>",
-        (1, 0, 0),
-    ),
-    "in the model, of old": ("1.4", "<xyz>1 0 0</xyz>", (1, 0, 0)),
-    "in the joint, of a version of two digits": ("1.10", "<xyz>1 0 0</xyz>", (0, 1, 0)),
-}
-
-
 @pytest.mark.parametrize(("version", "axis", "expected"), AXES.values(), ids=AXES)
 def test_axis_frame_by_version_and_attribute(version, axis, expected, tmp_path):
     half = np.pi / 2
@@ -122,50 +110,6 @@ def test_links_without_joint_are_free(tmp_path):
     )
     complains(file := model(tmp_path, text), "Free bodies: base", DRIVE)
     solution(load(file, replace(DRIVE, hold=("base",))))
-
-
-FAULTS = {
-    "ring of frames": (
-        '<frame name="B2" attached_to="b"/>',
-        '<frame name="B2" attached_to="b"><pose relative_to="F"/></frame>'
-        '<frame name="F"><pose relative_to="B2"/></frame>',
-        "is given in itself by a ring",
-    ),
-    "attached to itself": (
-        '<frame name="B2" attached_to="b"/>',
-        '<frame name="B2" attached_to="B2"/>',
-        "attached to itself",
-    ),
-    "unknown frame": (
-        'relative_to="B"',
-        'relative_to="BB"',
-        "found the frame 'm::BB', expected another one; did you mean 'm::B'",
-    ),
-    "unknown link": ("<child>a</child>", "<child>aa</child>", "found the frame 'm::aa'"),
-    "no child": ("<child>a</child>", "", "<child>: missing, expected a name; add it"),
-    "one link": (
-        "<parent>a</parent><child>B2",
-        "<parent>b</parent><child>B2",
-        "joins 'b' with itself",
-    ),
-    "five numbers": ("4 0 0 0 0.3 0", "4 0 0 0 0.3", "expected 6 numbers; correct the text"),
-    "no axis": ("<axis><xyz>0 1 0</xyz></axis>", "", "<axis>: missing, expected an axis; add it"),
-    "zero axis": ("<xyz>0 1 0</xyz>", "<xyz>0 0 0</xyz>", "found zero, of no direction"),
-    "unknown type": ('type="continuous"', 'type="planar"', "found 'planar', expected one of"),
-    "old screw": ('type="continuous"', 'type="screw"', "<screw_thread_pitch>: missing"),
-    "mistyped": (
-        "<parent>",
-        "<parant>x</parant><parent>",
-        "unknown in <joint>; did you mean 'parent'",
-    ),
-    "include": (
-        "</model>",
-        "<include><uri>x</uri></include></model>",
-        "expected a model in the folder of the file ... ; put it there, or write",
-    ),
-    "twice": ('<frame name="B2"', '<frame name="a"', "found 'a' again"),
-    "version": ('version="1.9"', 'version="1.x"', "version: found '1.x'"),
-}
 
 
 @pytest.mark.parametrize("kind", FAULTS)
@@ -250,19 +194,6 @@ def test_included_model_is_placed(uri, tmp_path):
     pin = 2.0 * np.sin(case.sweep.values)
     expected = [np.full(5, 2.0), pin, 2.0 * np.cos(case.sweep.values)]
     assert near(found.points["B"].position, np.transpose(expected))
-
-
-NOT_INCLUDED = {
-    "web": ("https://fuel.gazebosim.org/x", "", "expected a model in the folder"),
-    "far away": ("../../../etc/x.sdf", "", "expected a model in the folder"),
-    "itself": ("model.sdf", "", "with 0 models, expected <sdf> with one"),
-    "merged": ("model://bars", '</include><include merge="true">', "merge: is not read"),
-    "by no frame of it": (
-        "model://bars",
-        "<placement_frame>z</placement_frame>",
-        "the frame 'two::z'",
-    ),
-}
 
 
 @pytest.mark.parametrize(("uri", "more", "said"), NOT_INCLUDED.values(), ids=NOT_INCLUDED)

@@ -11,6 +11,9 @@ from kincheck.core.case.notes import notes
 from kincheck.core.cli import main
 
 from ...support.case_texts import write
+from ...support.examples import examples
+
+IMPROBABLE, PROBABLE = examples(__file__, "improbable", "probable")
 
 TEXT = """
 schema = "kincheck-case/1"
@@ -59,16 +62,7 @@ def said(tmp_path, length="mm", angle="deg", size="500", driver="push", way="80"
 
 @pytest.mark.parametrize(
     "given",
-    [
-        {},
-        {"length": "m", "size": "0.5", "way": "0.08"},
-        {"length": "m", "size": "99", "way": "1"},
-        {"size": "6", "way": "1"},
-        {"driver": "turn", "way": "30"},
-        {"driver": "turn", "way": "360"},
-        {"driver": "turn", "angle": "rad", "way": "6.28"},
-        {"size": "0", "way": "0.001"},
-    ],
+    PROBABLE,
     ids=str,
 )
 def test_probable_size_has_no_note(tmp_path, given):
@@ -77,38 +71,7 @@ def test_probable_size_has_no_note(tmp_path, given):
 
 @pytest.mark.parametrize(
     ("given", "words"),
-    [
-        (
-            {"size": "0.5", "way": "0.08"},
-            "the mechanism spans 0.5 mm ... expected 5 mm to 100000 mm ... metres declared as mm?",
-        ),
-        ({"length": "m", "size": "500"}, "the mechanism spans 500 m ... mm declared as m?"),
-        (
-            {"way": "0.08"},
-            "'push' ... from -0.08 mm to 0.08 mm ... 0.16 mm ... mechanism of 500 mm"
-            " ... metres declared as mm?",
-        ),
-        (
-            {"length": "m", "size": "0.5"},
-            "from -80 m to 80 m ... 160 m ... mechanism of 0.5 m ... mm declared as m?",
-        ),
-        (
-            {"length": "m", "size": "0.5", "way": "8e-5"},
-            "0.00016 m ... mm converted to m twice?",
-        ),
-        (
-            {"driver": "turn", "way": "0.0349"},
-            "from -0.0349 deg to 0.0349 deg ... 0.0698 deg ... radians declared as deg?",
-        ),
-        (
-            {"driver": "turn", "angle": "rad", "way": "45"},
-            "from -45 rad to 45 rad ... 90 rad ... degrees declared as rad?",
-        ),
-        (
-            {"driver": "turn", "angle": "rad", "way": "0.0005"},
-            "0.001 rad ... degrees converted to radians twice?",
-        ),
-    ],
+    IMPROBABLE,
     ids=str,
 )
 def test_improbable_size_is_noted(tmp_path, given, words):

@@ -8,9 +8,12 @@ from kincheck.core.errors import CaseError
 from kincheck.core.extensions.trees.reader import read_tree
 
 from ...support.case_texts import write
+from ...support.examples import examples
 from ...support.model_files import driven
 from ...support.model_poses import coordinate, solution
 from ...support.urdf_texts import robot
+
+BESIDE, UNKNOWN = examples(__file__, "beside", "unknown")
 
 FOUR_LINKS = """<robot name="r"><link name="base"/><link name="crank"/><link name="coupler"/>
 <link name="rocker"/><joint name="A" type="continuous"><parent link="base"/><child link="crank"/>
@@ -24,20 +27,6 @@ CLOSURE = """closures:
 independent: [A]
 dependent: [B, D]
 """
-OF_LINKS = """pin_loops:
-- {name: C, parent: coupler, child: rocker, parent_xyz: [0.6, 0.1, 0], child_xyz: [0.1, 0.3, 0],
-   axis: [0, 0, 2]}
-"""
-BESIDE = {
-    "in the file of the robot": ("robot.yaml", CLOSURE),
-    "in its own file": ("loop_closures.yaml", CLOSURE),
-    "in the package": ("config/loop_closures.yml", CLOSURE),
-    "of links": ("robot.loop_closures.yaml", OF_LINKS),
-    "of links, a ball": (
-        "robot_loop_closures.yaml",
-        OF_LINKS.replace("pin", "ball").replace(",\n   axis: [0, 0, 2]", ""),
-    ),
-}
 
 
 @pytest.mark.parametrize("way", BESIDE)
@@ -56,14 +45,7 @@ def test_closures_beside_urdf_close_loop(way, tmp_path):
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
-    [
-        ("closures:", "closure:", "found 'closure'"),
-        ("closures:", "extra_loops:", "extra_loops"),
-        ("link_a", "link_1", "link_1"),
-        ("coupler,", "couplr,", "did you mean 'coupler'?"),
-        ("[A]", "[E]", "independent: found 'E'"),
-        ("[0, 0, 1]", "[0, 0, 0]", "axis: found zero"),
-    ],
+    UNKNOWN,
 )
 def test_unknown_name_in_closures_is_named(old, new, said, tmp_path):
     pytest.importorskip("yaml")

@@ -5,44 +5,12 @@ import pytest
 from kincheck.core.case.models.files import load
 
 from ...support.case_texts import complains, write
+from ...support.examples import examples
 from ...support.model_files import driven, edited
 from ...support.model_poses import solution
 from ...support.urdf_texts import DRIVE, FOUR_BAR, TREE, beside, robot
 
-FAULTS = {
-    "two joints above": (
-        '<child link="c"/>',
-        '<child link="b"/>',
-        "'B' holds already ... <constraint>",
-    ),
-    "no link": ('<child link="c"/>', '<child link="cc"/>', "found 'cc', expected a link; did you"),
-    "ring": (
-        '<parent link="base"/><child link="a"/>',
-        '<parent link="tip"/><child link="a"/>',
-        "hangs on itself",
-    ),
-    "no child": ('<child link="a"/>', "", "<child>: missing, expected a link; add it"),
-    "two bases": (
-        '<link name="c"/>',
-        '<link name="c"/><link name="e"/>',
-        "found 2 links  ... (base, e)",
-    ),
-    "zero axis": ('xyz="0 1 0"', 'xyz="0 0 0"', "found zero, of no direction"),
-    "mistyped attribute": (
-        'rpy="1 2 3"',
-        'rpq="1 2 3"',
-        "URDF does not have ... ; did you mean 'rpy'",
-    ),
-    "mistyped element": ("<origin", "<orgin", "unknown in <joint>; did you mean 'origin'"),
-    "no type": (
-        'type="spherical"',
-        'type="rolling"',
-        "found 'rolling', expected one of fixed, link",
-    ),
-    "unknown joint": ('type="revolute"', 'type="hinge"', "found 'hinge', expected one of revolute"),
-    "macros": ("<constraint", "<xacro:leg/><constraint", "is a macro ... ; expand the file"),
-    "twice": ('<link name="c"/>', '<link name="b"/>', "found 'b' again"),
-}
+FAULTS, PAIRS = examples(__file__, "faults", "pairs")
 
 
 @pytest.mark.parametrize("kind", FAULTS)
@@ -79,22 +47,6 @@ def test_constraints_file_closes_loop(tmp_path):
 def test_constraints_file_fault_names_file(changes, said, tmp_path):
     file = beside(tmp_path, **changes)
     complains(file, f"{file.with_suffix('.constraints.json')} ... {said}", DRIVE)
-
-
-PAIRS = {
-    "a reference": ("closed_loop: [&x [a, b], *x]\ntype: [3d, 3d]", "found a reference"),
-    "fewer types": ("closed_loop: [[a, b]]\ntype: []", "type: found 0, expected 1"),
-    "unknown frame": ("closed_loop: [[a, bb]]\ntype: [3d]", "found 'bb', expected a link or joint"),
-    "unknown type": ("closed_loop: [[a, b]]\ntype: [4d]", "found '4d', expected 3d or 6d"),
-    "unknown joint": ("joint_name: [Q]\njoint_type: [FIXED]", "found 'Q', expected a joint"),
-    "no axes": (
-        "joint_name: [B]\njoint_type: [UJOINT_XW]",
-        "found 'UJOINT_XW', expected SPHERICAL",
-    ),
-    "no mapping": ("- 1", "expected closed_loop, type"),
-    "nested": ("[" * 400, "nested too deeply"),
-    "syntax": ("a: [", "not valid YAML"),
-}
 
 
 @pytest.mark.parametrize(("text", "said"), PAIRS.values(), ids=PAIRS)

@@ -12,6 +12,7 @@ from kincheck.core.extensions.same.verdict import compare
 from kincheck.core.extensions.trees.driving import read_start
 from kincheck.core.extensions.trees.reader import read_tree
 
+from ...support.examples import examples
 from ...support.model_files import driven
 from ...support.model_poses import EXACT, coordinate, near, solution
 from ...support.usd_texts import (
@@ -28,6 +29,8 @@ from ...support.usd_texts import (
     stage,
     write_stage,
 )
+
+(KINDS,) = examples(__file__, "kinds")
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("pxr") is None, reason="no usd-core")
 CENTI = 'metersPerUnit = 0.01\n    upAxis = "Z"'
@@ -128,18 +131,6 @@ def test_gravity_and_masses_in_stage_units(write):
     prims[0] = prim("PhysicsScene", "scene", scene)
     moon = load(write(*prims, units=""), DRIVE).mechanism.gravity
     assert moon == pytest.approx((0, 0, 1.62), abs=EXACT)
-
-
-KINDS = {
-    "": "slide slide slide ball",
-    "transX transY transZ": "ball",
-    "transX transY transZ rotX rotY": "hinge",
-    "rotX rotY rotZ": "slide slide slide",
-    "transY transZ rotX rotY rotZ": "slide",
-    "transX rotX rotY": "slide slide hinge",
-    "transX transZ rotX rotZ": "slide hinge",
-    "transX transY transZ rotX rotY rotZ": "",
-}
 
 
 @pytest.mark.parametrize("lock", KINDS)
