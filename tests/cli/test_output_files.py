@@ -9,12 +9,10 @@ from pathlib import Path
 import pytest
 from kincheck.core.cli.main import every_command, main
 
-VARY = {
-    "schema": "kincheck-vary/1",
-    "mode": "monte_carlo",
-    "units": {"length": "m"},
-    "hardpoints": {"ball": {"at": "joints.ball.point", "sigma": 1e-4}},
-}
+from ..support.examples import examples
+
+(VARY,) = examples(__file__, "vary")
+
 SWEEP = ("sweep", "mcpherson_strut", "--vary", "vary.json", "--samples", "8")
 OPTIONS = [
     *(
