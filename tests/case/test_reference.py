@@ -28,7 +28,9 @@ from scipy.interpolate import CubicSpline
 from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write
 from ..support.examples import examples
 
-UNITS, PRINTED, WRONG_UNITS = examples(__file__, "units", "printed", "wrong_units")
+UNITS, PRINTED, WRONG_UNITS, IN_GERMAN, IN_CSV, NO_TABLES = examples(
+    __file__, "units", "printed", "wrong_units", "in_german", "in_csv", "no_tables"
+)
 
 GERMAN = "push;tip_x;tip_x.velocity\n-0,1;1,4;2,0\n0,0;1,5;2,0\n0,1;1,6;2,0\n"
 DIALECTS = {
@@ -75,32 +77,9 @@ def test_output_without_reference(tmp_path):
 
 
 REFERENCES = [
-    (GERMAN.replace("1,5", "1.5"), "line 3 ... '1.5' ... '-0,1' above ... one decimal"),
-    (GERMAN.replace("1,5", "=B2"), "line 3, column tip_x ... '=B2' ... correct it"),
-    ("%PDF-1.7", "found a PDF document, expected text"),
-    (
-        CSV.replace("\n 0.0", "\n0.01"),
-        ("line 5 ... 0.01 m ... the nearest is 0 m ... expected 4 rows ... found 3"),
-    ),
-    (CSV.replace("1.5", "1_5"), "line 5 ... column tip_x ... '1_5' ... correct it"),
-    (CSV.replace("1.5", "nan"), "line 5 ... column tip_x ... 'nan' ... finite"),
-    (CSV.replace("1.5", "1e308"), "line 5 ... column tip_x ... '1e308' ... at most 1e+100"),
-    (CSV.replace("1.5", ""), "line 5 ... column tip_x ... expected a finite number"),
-    (CSV.replace("1.5, ", ""), "line 5 ... found 2 numbers ... expected 3"),
-    (CSV.replace("tip_x,", "tip_z,"), "line 3 ... 'tip_z' ... did you mean 'tip_x'"),
-    (
-        CSV.replace("tip_x,", "tip_x.acceleration,"),
-        "'tip_x.acceleration' alone ... add the column 'tip_x'",
-    ),
-    (CSV.replace("tip_x.velocity", "tip_x"), "'tip_x' twice"),
-    (
-        CSV.replace("push, ", "tip_x, "),
-        ("'tip_x' first, the name of an output ... driver values ... name it otherwise"),
-    ),
-    ("push\n-0.1\n0\n0.1\n", "no column of an output"),
-    ("-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "line 1 ... '1.4' ... outputs of the case"),
-    ('push, "tip_x\n', "not valid CSV"),
-    ("# nothing\n", "no samples"),
+    *((GERMAN.replace(old, new), said) for old, new, said in IN_GERMAN),
+    *((CSV.replace(old, new), said) for old, new, said in IN_CSV),
+    *NO_TABLES,
 ]
 
 
