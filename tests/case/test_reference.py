@@ -28,6 +28,8 @@ from scipy.interpolate import CubicSpline
 from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write
 from ..support.examples import examples
 
+(CRANK,) = examples(__file__, "crank")
+
 UNITS, PRINTED, WRONG_UNITS, IN_GERMAN, IN_CSV, NO_TABLES = examples(
     __file__, "units", "printed", "wrong_units", "in_german", "in_csv", "no_tables"
 )
@@ -134,42 +136,6 @@ def test_wrong_column_unit_is_refused(tmp_path, head, fragments):
     complains(write(tmp_path, BASE + BY_FILE), f"tip.csv ... {fragments}")
 
 
-CRANK = """
-schema = "kincheck-case/1"
-name = "crank"
-source = "made up for this test"
-truth = "third_party_data"
-[units]
-length = "mm"
-[bodies.crank]
-[joints.pin]
-type = "revolute"
-bodies = ["ground", "crank"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[points.tip]
-body = "crank"
-position = [100, 0, 0]
-[drivers.turn]
-type = "joint_angle"
-joint = "pin"
-[sweep]
-driver = "turn"
-SWEEP
-[outputs.x]
-point = "tip"
-component = "x"
-atol = ATOL
-why = "repeatability of the rig"
-[outputs.y]
-point = "tip"
-component = "y"
-atol = ATOL
-why = "repeatability of the rig"
-[reference]
-file = "rig.csv"
-citation = "a rig that was made up for this test"
-"""
 EVEN = "start = -1.0\nstop = 1.0\nsteps = 21"
 AT = 'at = "reference"'
 

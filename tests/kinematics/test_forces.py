@@ -32,19 +32,9 @@ from ..support.examples import examples
 from ..support.loads import GRAVITY, loaded, pushes, six, solved
 from ..support.mechanisms import BRANCH, X, Z, chain
 
+(EQUILIBRIUM,) = examples(__file__, "equilibrium")
+
 (DETERMINED,) = examples(__file__, "determined")
-EQUILIBRIUM = [
-    "mcpherson_strut",
-    "mcpherson_steered",
-    "rssr",
-    "four_bar",
-    "spatial_slider_crank",
-    "bennett",
-    "bricard",
-    "hooke_joint_cross",
-    "double_cardan",
-    "chrono_multi_link_bodies",
-]
 
 
 @pytest.mark.by_day(2)

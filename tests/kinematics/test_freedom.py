@@ -5,6 +5,7 @@ where the numbers do not match.
 import re
 from dataclasses import replace
 
+import kincheck  # noqa: F401  in the calls of the examples
 import numpy as np
 import pytest
 from kincheck import (
@@ -20,13 +21,13 @@ from kincheck import (
     SolveError,
     Spherical,
     Translational,
-    Universal,
     solve,
 )
 from kincheck.core.failures import FailureKind
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.structure.degrees_of_freedom import account
 
+from ..support.examples import examples
 from ..support.mechanisms import (
     CRANK,
     D0,
@@ -39,6 +40,8 @@ from ..support.mechanisms import (
     slider_crank,
     solve_all,
 )
+
+(FREEDOMS,) = examples(__file__, "freedoms")
 
 
 def account_of(mechanism):
@@ -69,20 +72,10 @@ def test_freedom_account_of_mcpherson():
 A, B, X = (0.1, -0.2, 0.3), (0.5, 0.4, 0.9), (1.0, 2.0, -0.5)
 
 
-@pytest.mark.parametrize(
-    ("joint", "dof"),
-    [
-        (Revolute("j", "ground", "body", A, X), 1),
-        (Spherical("j", "ground", "body", A), 3),
-        (Translational("j", "ground", "body", A, X), 1),
-        (Universal("j", "ground", "body", A, ((1.0, 1.0, 0.0), (1.0, -1.0, 0.5))), 2),
-        (Fixed("j", "ground", "body", A), 0),
-        (Distance("j", "ground", "body", (A, B)), 5),
-    ],
-    ids=lambda each: str(getattr(each, "type", each)),
-)
-def test_freedom_of_joints(joint, dof):
+@pytest.mark.parametrize(("call", "dof"), FREEDOMS.items())
+def test_freedom_of_joints(call, dof):
     """Formulation section 6."""
+    joint = eval(f"kincheck.{call}")
     found = account_of(Mechanism("m", [Body("body")], [joint]))
     assert (found.dof, found.rank) == (dof, joint.rows)
 

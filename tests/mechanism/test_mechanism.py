@@ -5,6 +5,7 @@ import random
 import re
 from dataclasses import replace
 
+import kincheck  # noqa: F401  in the calls of the examples
 import numpy as np
 import pytest
 from kincheck import (
@@ -17,15 +18,12 @@ from kincheck import (
     JointAngle,
     Mechanism,
     MechanismError,
-    PerpendicularAxes,
     Point,
     PointCoordinate,
-    Ramp,
     Revolute,
     Screw,
     Spherical,
     Table,
-    Universal,
     UnknownNameError,
     clear_caches,
     solve,
@@ -34,7 +32,10 @@ from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.tree import spanning_tree
 from kincheck.core.studies.checks.check_joint import specimens_of
 
+from ..support.examples import examples
 from ..support.mechanisms import ORIGIN, X
+
+(WRONG,) = examples(__file__, "wrong")
 
 
 def rssr(held=tuple):
@@ -79,88 +80,10 @@ def test_mechanism_copies_mutable_arrays():
     assert point.position == (2.0, 4.9, 2.2)
 
 
-WRONG = [
-    (
-        lambda: Revolute("a", "b", "c", (1, 2), (0, 0, 1)),
-        "joint 'a' (revolute): point is (1, 2), expected a point",
-    ),
-    (lambda: Distance("a", "b", "c", (1, 2, 3)), "points is (1, 2, 3), expected two points"),
-    (lambda: Body("b", (0, 0, 0, 1)), "body 'b': origin is (0, 0, 0, 1), expected a point"),
-    (
-        lambda: PointCoordinate("d", "end", (0, 1)),
-        "driver 'd': direction is (0, 1), expected a direction",
-    ),
-    (
-        lambda: Body("b", (0, np.nan, 0)),
-        "body 'b': origin = (0, nan, 0) is not finite; give a point",
-    ),
-    (
-        lambda: Point("P", "b", ("1", "2", "3")),
-        "position = ('1', '2', '3') is not finite; give a point",
-    ),
-    (
-        lambda: Revolute("a", "b", "c", ORIGIN, (0, 0, 1e-200)),
-        "axis has length 1e-200, whose square",
-    ),
-    (lambda: PointCoordinate("d", "P", ORIGIN), "driver 'd': direction is zero"),
-    (lambda: Ramp("a"), "ramp motion: rate is 'a'; give a finite number"),
-    (
-        lambda: Revolute("a", "b", "c", ORIGIN, None),
-        "joint 'a' (revolute): axis is None, expected a direction",
-    ),
-    (
-        lambda: Distance("a", "b", "c", (ORIGIN, (0.4, 0, 0)), -4.0),
-        (
-            "length is -4 m, expected a positive one; the points are 0.4 m apart at design, which"
-            " is the length where none is given"
-        ),
-    ),
-    (
-        lambda: Distance("a", "b", "c", (ORIGIN, (0.4, 0, 0)), 0.0),
-        "length is 0 m, expected a positive one",
-    ),
-    (lambda: Distance("a", "b", "c", (X, X), 2.0), "the points coincide at design"),
-    (
-        lambda: PerpendicularAxes("a", "b", "c", (X, (0.02, 1, 0))),
-        "joint 'a' (perpendicular_axes): the axes are not perpendicular, the cosine of their angle"
-        " is 0.02",
-    ),
-    (
-        lambda: Universal("a", "b", "c", ORIGIN, (X, (-0.02, 1, 0))),
-        "joint 'a' (universal): the axes are not perpendicular, the cosine of their angle is -0.02",
-    ),
-    (
-        lambda: Screw("a", "b", "c", ORIGIN, (0, 0, 1), None),
-        "joint 'a' (screw): lead is None, expected a length",
-    ),
-    (
-        lambda: Revolute("a", "b", "c", np.zeros((3, 1)), (0, 0, 1)),
-        "point = ([0.0], [0.0], [0.0]) is not",
-    ),
-    (
-        lambda: Screw("a", "b", "c", ORIGIN, (0, 0, 1), [1.0]),
-        "lead = [1.0] is not finite; give a length",
-    ),
-    (lambda: Gear("g", ("a", "b"), ratio=np.array(1 + 2j)), "ratio = (1+2j) is not finite"),
-    (
-        lambda: Ramp(np.complex128(0.1 + 5j)),
-        "ramp motion: rate is np.complex128(0.1+5j); give a finite number",
-    ),
-    (
-        lambda: Table((0.0, 1.0), ("a", 1.0)),
-        "table motion: a time or value is not finite; give numbers",
-    ),
-    (
-        lambda: Table((0.0, 1.0), None),
-        "table motion: values is None, expected as many numbers as samples",
-    ),
-]
-
-
-@pytest.mark.parametrize(("make", "message"), WRONG, ids=[message for _, message in WRONG])
-def test_description_of_wrong_kind_is_refused(make, message):
+@pytest.mark.parametrize(("call", "message"), WRONG.items(), ids=WRONG.values())
+def test_description_of_wrong_kind_is_refused(call, message):
     with pytest.raises(MechanismError, match=re.escape(message)):
-        make()
+        eval(f"kincheck.{call}")
 
 
 @pytest.mark.parametrize("given", [None, "abcd", 1.0, X, (float("nan"), 0.0, 0.0, 0.0)], ids=str)

@@ -3,21 +3,11 @@
 import ast
 import copy
 
-SWAPPED = {"i": "j", "j": "i", "vi": "vj", "vj": "vi", "f": "g", "g": "h", "h": "f"}
+from ..support.examples import examples
+
+FIELDS, SWAPPED = examples(__file__, "fields", "swapped")
+
 """Names of bodies, twists and axes, and what is taken instead."""
-FIELDS = {
-    "s_i": "s_j",
-    "s_j": "s_i",
-    "v": "w",
-    "c": "c_t",
-    "c_t": "c_tt",
-    "c_tt": "c_t",
-    "half_cos": "half_sin",
-    "half_sin": "half_cos",
-    "turn": "swing",
-    "swing": "turn",
-    "e0": "c",
-}
 """The same of attributes."""
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add}
 CHANGED = ast.BinOp | ast.UnaryOp | ast.Name | ast.Attribute | ast.Constant | ast.Call | ast.Tuple
