@@ -17,6 +17,10 @@ from kincheck.core.cli.main import main
 from kincheck.core.extensions.code import c, fmu, js
 from scipy.interpolate import CubicSpline
 
+from ...support.examples import examples
+
+(LOCKS,) = examples(__file__, "locks")
+
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
 CLOSE = 1e-13
 """Largest difference to native, relative to the largest value: a thousand round-offs."""
@@ -265,42 +269,6 @@ component = "z"
     assert found[:, 1, 0] == pytest.approx(np.sin(0.5 * turn), abs=CLOSE)
     assert found[:, 2, 0] == pytest.approx(np.angle(np.exp(1j * turn)), abs=CLOSE)
     assert found[:, 0, 1] == pytest.approx(1.0, abs=CLOSE)
-
-
-LOCKS = """schema = "kincheck-case/1"
-name = "locks"
-source = "a rod of 1 m from a slide to a crank of 2 m: it locks where they are in line"
-[bodies.crank]
-[bodies.slide]
-[joints.pivot]
-type = "revolute"
-bodies = ["ground", "crank"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[joints.guide]
-type = "translational"
-bodies = ["ground", "slide"]
-point = [0, 0, 0]
-axis = [0, 1, 0]
-[joints.rod]
-type = "distance"
-bodies = ["crank", "slide"]
-points = [[2, 0, 0], [1.2, 0.6, 0]]
-[points.end]
-body = "slide"
-position = [1.2, 0.6, 0]
-[drivers.lift]
-type = "joint_displacement"
-joint = "guide"
-[sweep]
-driver = "lift"
-start = 0.0
-stop = 1.0
-steps = 3
-[outputs.turn]
-type = "joint_angle"
-joint = "pivot"
-"""
 
 
 @compiled

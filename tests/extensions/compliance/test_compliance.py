@@ -25,7 +25,7 @@ from ...kinematics.test_bushings import bushed
 from ...support.engine_motion import SIMULATORS, installed
 from ...support.examples import examples
 
-(HINGES,) = examples(__file__, "hinges")
+SERIES, WHEEL, HINGES = examples(__file__, "series", "wheel", "hinges")
 
 DATA = Path(__file__).parents[2] / "data" / "elastokinematics"
 STRUT = json.loads((DATA / "5_strut_kc.json").read_text())
@@ -54,20 +54,6 @@ def strut_text(more=""):
         text += bushing_table(JOINTS[each["name"]], each["name"], each["bodies"], *numbers)
     text += f'[points.contact_patch]\nbody = "knuckle"\nposition = {STRUT["contact_patch"]}\n'
     return text + more
-
-
-WHEEL = """
-[suspension]
-convention = "CONVENTION"
-side = "left"
-forward = [1.0, 0.0, 0.0]
-up = [0.0, 0.0, 1.0]
-wheel_radius = 0.3
-[outputs.toe]
-type = "toe"
-[outputs.camber]
-type = "camber"
-"""
 
 
 OUTBOARD = WHEEL.replace("CONVENTION", "iso8855").replace(
@@ -414,48 +400,6 @@ def test_bench_compliance_times_samples_and_matrices(tmp_path, capsys):
     assert found["reached"] == found["samples"]
     assert found["us_per_sample"]["median"] > found["us_per_matrix"]["median"] > 0.0
     assert "us a matrix at least" in capsys.readouterr().out
-
-
-SERIES = """
-schema = "kincheck-case/1"
-name = "series"
-source = "made"
-[units]
-length = "mm"
-[bodies.sub]
-mass = 3.0
-center_of_mass = [0, 500, 0]
-[bodies.wheel]
-mass = 10.0
-center_of_mass = [0, 700, 0]
-[forces.a]
-type = "bushing"
-bodies = ["ground", "sub"]
-point = [0, 700, 0]
-stiffness = 300
-turning_stiffness = 5e8
-[forces.b]
-type = "bushing"
-bodies = ["sub", "wheel"]
-point = [0, 700, 0]
-stiffness = [1000, 2000, 600]
-turning_stiffness = 5e8
-[points.wheel_center]
-body = "wheel"
-position = [0, 700, 0]
-[points.contact_patch]
-body = "wheel"
-position = [0, 700, -300]
-[drivers.stroke]
-type = "point_coordinate"
-point = "wheel_center"
-direction = [0, 0, 1]
-[sweep]
-driver = "stroke"
-start = 0
-stop = 10
-steps = 2
-"""
 
 
 @pytest.mark.parametrize("name", ["mujoco", "exudyn", "exudyn-static"])

@@ -18,7 +18,7 @@ from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from ...support.examples import examples
 
-(SLIDES,) = examples(__file__, "slides")
+RUBBER, SLIDES = examples(__file__, "rubber", "slides")
 
 DEG = np.pi / 180.0
 NOISE = {"toe": 0.005 * DEG, "camber": 0.01 * DEG, "half_track_change": 5e-5}
@@ -306,21 +306,6 @@ def test_fit_travel_beyond_lock_is_refused(bench, tmp_path, capsys):
     assert main(["fit", str(bench[0]), "--measured", str(Path("no.csv"))]) == 2
 
 
-RUBBER = """\
-[bushings.uca_rear]
-stiffness = [1e6, 2e6, 1e6]
-turning_stiffness = [100.0, 100.0, 0.0]
-
-[bushings.lca_front]
-stiffness = 3e6
-turning_stiffness = [100.0, 100.0, 0.0]
-
-[bushings.uca_front]
-stiffness = 1e6
-
-[bushings.lca_rear]
-stiffness = 1e6
-"""
 RATES = {"uca_rear x": 0.2, "lca_front y": -0.3}
 COMPLIANCE = {"toe": "lateral", "camber": "lateral", "wheel_center.y": "braking"}
 

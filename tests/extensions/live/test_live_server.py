@@ -40,7 +40,7 @@ from ...oracles.naive import A
 from ...support.examples import examples
 from .conftest import CAR, TRAVEL, Page, page_of
 
-(REQUESTS,) = examples(__file__, "requests")
+VARY, REQUESTS = examples(__file__, "vary", "requests")
 
 
 def status(server, path, method="GET", **headers):
@@ -59,10 +59,7 @@ def test_server_listens_on_loopback(served):
     assert served.listener.socket.getsockname()[0] == "127.0.0.1"
 
 
-@pytest.mark.parametrize(
-    ("path", "header", "expected"),
-    REQUESTS,
-)
+@pytest.mark.parametrize(("path", "header", "expected"), REQUESTS)
 def test_request_without_token_is_refused(served, path, header, expected):
     headers = dict([header.split()] if header else [])
     assert status(served, path.format(token=served.token), **headers)[0] == expected
@@ -499,21 +496,6 @@ def test_axle_edit_divides_no_step(car, monkeypatch, axle, travel, whole):
 
 
 RIG = "# signs: iso8855\ntravel [mm],Toe Angle [deg]\n-30,0.22\n0,0.01\n30,-0.18\n"
-VARY = """\
-schema = "kincheck-vary/1"
-mode = "monte_carlo"
-
-[units]
-length = "mm"
-angle = "deg"
-
-[hardpoints.tie]
-at = "tierod_outer"
-sigma = 0.5
-
-[limits.toe]
-high = 0.3
-"""
 
 
 def test_live_reference_has_tolerance(car, tmp_path):

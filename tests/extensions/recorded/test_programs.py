@@ -8,6 +8,9 @@ import pytest
 from kincheck.core.cli.main import main
 
 from ...support.crank import MECHANISM
+from ...support.examples import examples
+
+(CRANK,) = examples(__file__, "crank")
 
 CASE = f"""{MECHANISM}[sweep]
 driver = "turn"
@@ -15,20 +18,6 @@ start = -1.0
 stop = 1.0
 steps = 21
 rate = 2.0
-"""
-CRANK = r"""
-#include <math.h>
-#include <stdio.h>
-int main(int argc, char **argv) {
-  FILE *in = fopen(argv[1], "r"), *out = fopen(argv[2], "w");
-  double t, x, v, a;
-  fscanf(in, "%*[^\n]");
-  fprintf(out, "tip.x,tip.x.velocity,tip.x.acceleration,tip.y [mm]\n");
-  while (fscanf(in, "%lf,%lf,%lf,%lf", &t, &x, &v, &a) == 4)
-    fprintf(out, "%.17g,%.17g,%.17g,%.17g\n", 0.5 * cos(x), -0.5 * sin(x) * v,
-            -0.5 * cos(x) * v * v - 0.5 * sin(x) * a, 500.0 * sin(x));
-  return 0;
-}
 """
 POSES = """
 import csv, math, sys
