@@ -166,23 +166,6 @@ def test_axle_in_heave_equals_one_wheel(tmp_path):
     assert np.abs(found["axle_roll_center_offset"]).max() < CLOSE
 
 
-@pytest.mark.parametrize("name", TEMPLATES)
-def test_axle_points_mirror_one_wheel(tmp_path, name):
-    """As those of one wheel, mirrored for the right; what is fixed stays so, steered or not."""
-    file = table(tmp_path, name)
-    wheel, both = (
-        load(file, Supplied(travel="0.02:3", axle=motion)).mechanism for motion in (None, "roll")
-    )
-    found = {point.name.strip("~"): (point.body, point.position) for point in both.points}
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        for point in wheel.points:
-            body, position = found.pop(f"{side}_{point.name.strip('~')}")
-            x, y, z = point.position
-            assert body == (point.body if point.body == "ground" else f"{side}_{point.body}")
-            assert position == pytest.approx((x, sign * y, z), abs=1e-15)
-    assert not found
-
-
 def test_axle_without_steering(tmp_path):
     case = axle(tmp_path, "three_link", "roll")
     assert [driver.name for driver in case.mechanism.drivers] == ["left_stroke", "right_stroke"]
