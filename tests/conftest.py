@@ -11,8 +11,7 @@ import kincheck.adapters
 import kincheck.cases
 import pytest
 from hypothesis import settings
-from kincheck.core import Joint
-from kincheck.core.caches import clear_caches
+from kincheck import Joint, clear_caches
 from kincheck.core.cli import main as cli
 from kincheck.core.doors import extensions
 from kincheck.core.harness import execution, provenance

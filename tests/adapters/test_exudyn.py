@@ -6,7 +6,7 @@ from kincheck import Distance, PointCoordinate, Spherical, Translational
 from kincheck.adapters.exudyn.exudyn import Exudyn
 
 from ..support.engine_motion import TOL, mechanism_of, motion_case, solved
-from ..support.mechanisms import ORIGIN, X
+from ..support.mechanisms import ORIGIN, X, Y
 
 pytest.importorskip("exudyn")
 
@@ -19,7 +19,7 @@ def test_exudyn_accelerations_of_short_rod():
     length, x = 0.004, np.linspace(0.0, 0.0035, 8)
     joints = [
         Translational("a", "ground", "first", ORIGIN, X),
-        Translational("b", "ground", "second", X, (0.0, 1.0, 0.0)),
+        Translational("b", "ground", "second", X, Y),
         Distance("rod", "first", "second", (ORIGIN, (0.0, length, 0.0))),
     ]
     driver = PointCoordinate("x", "start", X)

@@ -37,7 +37,7 @@ from ..support.engine_motion import (
     way_by_day,
 )
 from ..support.joint_loops import RATE, TOO_LOOSE, TURN, TYPES, assert_moves_natively, on_crank
-from ..support.mechanisms import ORIGIN, X
+from ..support.mechanisms import ORIGIN, X, Z
 
 TURNS = np.linspace(-7.0, 7.0, 29)
 AXIS, TIP = (1.0, 2.0, -2.0), np.array([0.3, -0.2, 0.4])
@@ -153,7 +153,7 @@ def test_second_joint_between_same_bodies(second, engine):
     """Rows of a constraint within one rigid body, or on an axis that is there already: zeros, which
     OpenSim and MuJoCo treat apart.
     """
-    z, place = (0.0, 0.0, 1.0), (0.0, 0.0, 0.3)
+    z, place = Z, (0.0, 0.0, 0.3)
     how = {
         Distance: (((0.1, 0.0, 0.0), (0.2, 0.1, 0.0)),),
         Revolute: (place, z),

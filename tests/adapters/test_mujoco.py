@@ -34,7 +34,7 @@ from ..support.engine_motion import (
     solved,
     with_joints,
 )
-from ..support.mechanisms import X
+from ..support.mechanisms import ORIGIN, X
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
@@ -94,7 +94,7 @@ def test_mujoco_rod_at_dead_centre():
     """At its dead centre MuJoCo leaves the rod's row out; the row is zero there, its rate v^2 /
     span.
     """
-    guide = Translational("guide", "ground", "slider", (0.0, 0.0, 0.0), X)
+    guide = Translational("guide", "ground", "slider", ORIGIN, X)
     rod = Distance("rod", "ground", "slider", ((0.0, 0.3, 0.0), (0.4, 0.0, 0.0)))
     mechanism = mechanism_of([guide, rod], {}, [JointDisplacement("push", "guide")])
     model = adapter.MuJoCoModel(adapter.mujoco(), motion_case(mechanism, [0.0]))

@@ -36,7 +36,7 @@ def jack():
     )
 
 
-def moved(mechanism, factor, offset=(0.0, 0.0, 0.0)):
+def moved(mechanism, factor, offset=ORIGIN):
     """Of another size, then elsewhere, with points rounded to 2^-30 m: sums with whole metres are
     exact.
     """
@@ -102,7 +102,7 @@ def test_own_frame_has_unit_size():
     assert frame.unit == 2.0**-30
     assert frame.origin == (2.0**-9, 0.0, 2.0**-8)
     assert own_frame(own).unit == 1.0
-    assert own_frame(own).origin == (0.0, 0.0, 0.0)
+    assert own_frame(own).origin == ORIGIN
     wanted = jack()
     assert own.mechanism == wanted
     # what steps are judged by

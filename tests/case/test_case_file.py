@@ -28,6 +28,7 @@ from kincheck.core.joints.base import length, position
 from kincheck.core.mechanism.motions import Absolute
 
 from ..support.case_texts import BASE, INLINE, edited, write
+from ..support.mechanisms import X, Y, Z
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "data" / "case_files").glob("*.toml"))
 
@@ -78,7 +79,7 @@ def test_case_file_values(tmp_path):
     assert case.mechanism.point("tip").position == (1.5, 2.0, 3.0)
     assert (case.sweep.driver, case.sweep.rate, case.sweep.design) == ("push", 2.0, 0.0)
     assert case.sweep.values.tolist() == [-0.1, 0.0, 0.1]
-    x = (1.0, 0.0, 0.0)
+    x = X
     assert case.outputs == (Output("tip_x", "tip", x, False, 1e-9, 0.0, why),)
     series = case.reference["tip_x"]
     assert series.position.tolist() == [1.4, 1.5, 1.6]
@@ -173,7 +174,7 @@ def test_absolute_point_driver_design_value(tmp_path):
 
 def test_default_outputs_of_points(tmp_path):
     case = load_case(write(tmp_path, BASE[: BASE.index("[outputs")]))
-    directions = {"tip.x": (1, 0, 0), "tip.y": (0, 1, 0), "tip.z": (0, 0, 1)}
+    directions = {"tip.x": X, "tip.y": Y, "tip.z": Z}
     assert {output.name: output.direction for output in case.outputs} == directions
     for output in case.outputs:
         assert not output.relative
@@ -327,7 +328,7 @@ def test_gear_rack_and_screw_move(tmp_path):
         RackPinion("rolls", ("pinion_axle", "guide"), -0.02),
     )
     assert case.mechanism.joint("thread") == Screw(
-        "thread", "column", "nut", (0.0, 0.0, 0.1), (0.0, 0.0, 1.0), 0.006
+        "thread", "column", "nut", (0.0, 0.0, 0.1), Z, 0.006
     )
     assert case.mechanism.joint("upright") == OrientationLock("upright", "ground", "nut")
     found = solved(case)

@@ -4,8 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.cases import andrews_squeezer, load
-from kincheck.cases.jet import Jet
+from kincheck.cases import Jet, andrews_squeezer, load
 from kincheck.cases.vectors import Circle
 
 from ..support.fakes import swept

@@ -10,9 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from kincheck import cases
+from kincheck import Body, CaseError, Distance, JointAngle, Mechanism, Point, Revolute, cases, solve
 from kincheck.adapters.native import Native
 from kincheck.cases import (
+    Jet,
     bennett,
     bricard,
     hooke_joint,
@@ -21,13 +22,13 @@ from kincheck.cases import (
     rssr,
     spatial_slider_crank,
 )
-from kincheck.cases.jet import Jet, steady
+from kincheck.cases.jet import steady
 from kincheck.cases.vectors import Circle
-from kincheck.core import Body, CaseError, Distance, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core.case.case import Output, Truth, without_forces
 from kincheck.core.harness.compare import deviations, output_series
 
 from ..support.fakes import swept
+from ..support.mechanisms import ORIGIN, X, Z
 
 CASES = {name: cases.load(name) for name in cases.names()}
 
@@ -214,7 +215,7 @@ def test_bricard_loop_closes():
         for name, xyz in bricard.motion(angles(0, -60, 25)).items()
     }
     assert np.linalg.norm(points["P5"], axis=1) == pytest.approx(np.ones(3), abs=1e-15)
-    start = {"P2": (1, -1, 0), "P3": (1, -1, 1), "P4": (0, -1, 1), "P5": (0, 0, 1)}
+    start = {"P2": (1, -1, 0), "P3": (1, -1, 1), "P4": (0, -1, 1), "P5": Z}
     assert {name: tuple(np.round(xyz[0], 15)) for name, xyz in points.items()} == start
 
 
@@ -241,7 +242,7 @@ def test_rssr_reach_ends_where_assembly_ends():
     and 90 degrees (mpmath).
     """
     O, start = (6.0, 1.0, 0.5), 80.0  # noqa: E741
-    crank = Circle((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 2.0, 0.0)).turned(angles(start))
+    crank = Circle(ORIGIN, (2.0, 0.0, 0.0), (0.0, 2.0, 0.0)).turned(angles(start))
     pin, rocker = (
         tuple(float(jet.x[0]) for jet in vec)
         for vec in (crank, Circle(O, (0.0, 4.0, 0.0), (0.0, 0.0, 4.0)).meet(crank, 7.0, 1.0))
@@ -250,8 +251,8 @@ def test_rssr_reach_ends_where_assembly_ends():
         "rocking",
         [Body("crank"), Body("rocker")],
         [
-            Revolute("in", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-            Revolute("out", "ground", "rocker", O, (1.0, 0.0, 0.0)),
+            Revolute("in", "ground", "crank", ORIGIN, Z),
+            Revolute("out", "ground", "rocker", O, X),
             Distance("rod", "crank", "rocker", (pin, rocker)),
         ],
         [Point("pin", "rocker", rocker)],

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
+from kincheck import Outcome, Ramp, Sine, Table, adapters, cases
 from kincheck.core.case.case import Sweep
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.cli import main
 from kincheck.core.harness.compare import pace
-from kincheck.core.harness.record import Outcome, from_json, to_json
+from kincheck.core.harness.record import from_json, to_json
 from kincheck.core.harness.run import run
-from kincheck.core.mechanism.motions import Absolute, Ramp, Sine, Table
+from kincheck.core.mechanism.motions import Absolute
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.report import write_report
 

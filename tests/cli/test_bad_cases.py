@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 import kincheck.adapters
 import kincheck.cases
 import kincheck.core
+from kincheck import CaseError
 from kincheck.core.cli.main import main
-from kincheck.core.errors import CaseError
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.report.report import caveats, headline
 

@@ -73,11 +73,7 @@ def test_unselected_native_is_standard(kincheck_main, capsys):
 
 @pytest.mark.parametrize(
     ("engines", "options", "inside"),
-    [
-        ([RIGHT], [], True),
-        ([RIGHT], ["--timeout", "60"], False),
-        ([RIGHT, Fake()], [], False),
-    ],
+    [([RIGHT], [], True), ([RIGHT], ["--timeout", "60"], False), ([RIGHT, Fake()], [], False)],
     ids=["native", "native, limited", "both"],
 )
 def test_simulators_run_in_worker_processes(

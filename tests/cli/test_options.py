@@ -39,6 +39,7 @@ run rssr --timeout 2e9 | argument --timeout: '2e9' is too large. Give 1e+09 at m
 run rssr --out= | argument --out: found an empty name; give one, or leave it out
 run --joints rssr --reactions | --reactions: the loops of --joints have no masses
 kc rssr --travel -60mm:60mm:5 | rssr: no point is the wheel's centre
+kc rssr --jobs 0 --timeout 5 --engine native | cannot be limited. Leave out --timeout
 run rssrr | did you mean 'rssr'? Case files end in
 sweep rssr --vary x --sampling ltin
     | 'ltin' is none of random, latin, sobol; did you mean 'latin'?

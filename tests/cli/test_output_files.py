@@ -62,10 +62,7 @@ def test_impossible_output_file_is_refused(here, capsys, command, option, name):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 @pytest.mark.parametrize(
     ("command", "said"),
-    [
-        (("explain", "five_bar"), "five_bar: "),
-        (("assemblies", "five_bar"), "assemblies from"),
-    ],
+    [(("explain", "five_bar"), "five_bar: "), (("assemblies", "five_bar"), "assemblies from")],
 )
 def test_full_disk_still_prints_answer(capsys, command, said):
     assert main([*command, "--json", "/dev/full"]) == 2
@@ -95,7 +92,7 @@ def test_replaced_file_stays_whole_for_readers(here):
 
 LIMITED = """
 import resource, sys
-from kincheck.core.cli.main import main
+from kincheck.core.cli.main import every_command, main
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
 sys.exit(main())
 """
@@ -134,7 +131,7 @@ def test_full_disk_keeps_previous_store(here, stopped_sweep):
 
 KILLED = """
 import os, signal, sys
-from kincheck.core.cli.main import main
+from kincheck.core.cli.main import every_command, main
 from kincheck.core.extensions.sweep.chunk_files import ParquetStore
 
 write = ParquetStore.write

@@ -6,8 +6,7 @@ import shutil
 import subprocess
 
 import pytest
-from kincheck import cases
-from kincheck.core import Revolute
+from kincheck import Revolute, cases
 from kincheck.core.cli.joint_loading import named_joint
 from kincheck.core.cli.main import every_command, main
 from kincheck.core.harness.provenance import truth_of
@@ -77,8 +76,7 @@ export rssr --at nan | 'nan' is not a number
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
-    at_hand(rows(USAGE, named=False), {*every_command(), "runn", "--engine"}),
+    ("line", "said"), at_hand(rows(USAGE, named=False), {*every_command(), "runn", "--engine"})
 )
 def test_usage_errors_state_command_and_remedy(line, said, capsys):
     assert main(line.split()) == 2

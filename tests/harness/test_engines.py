@@ -16,7 +16,7 @@ from kincheck.core.cli.registry import Status
 from kincheck.core.harness.engine import Unloadable, versions
 
 from ..support.fakes import record_of, run_case
-from ..support.mechanisms import placed
+from ..support.mechanisms import ORIGIN, placed
 from ..support.version_engines import DEEDS, Foreign, Loading, Ours
 
 # Closed forms over a full turn: a thousand times the round-off of metres, so that a slip in
@@ -85,7 +85,7 @@ def test_far_turned_world_keeps_digits(name):
     (stroke,) = moved.drivers
     moved = replace(
         moved,
-        bodies=[replace(body, origin=(0.0, 0.0, 0.0)) for body in moved.bodies],
+        bodies=[replace(body, origin=ORIGIN) for body in moved.bodies],
         drivers=[replace(stroke, direction=tuple(turn @ np.array(stroke.direction)))],
     )
     outputs = tuple(

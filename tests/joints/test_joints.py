@@ -11,8 +11,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from kincheck.core import (
+from kincheck import (
     Body,
+    Joint,
     JointAngle,
     Mechanism,
     MechanismError,
@@ -23,11 +24,12 @@ from kincheck.core import (
 )
 from kincheck.core import joints as library
 from kincheck.core.algebra import Quat, Vec3
-from kincheck.core.joints import Attachment, Joint
+from kincheck.core.joints import Attachment
 from kincheck.core.joints.base import direction, position
-from kincheck.core.primitives.base import Pose, Twist
+from kincheck.core.primitives import Pose, Twist
 
 from ..oracles import naive
+from ..support.mechanisms import ORIGIN, X, Y, Z
 
 P, Q = (0.3, -0.2, 0.5), (0.9, 0.4, 0.1)
 AXIS = (1.0, 2.0, -0.5)
@@ -226,11 +228,7 @@ def test_joint_freedoms_complement_rows(name):
 )
 def test_joint_field_without_kind_is_refused(annotation):
     """Else it were taken for a number, and no specimen but its default tried."""
-    body = {
-        "__annotations__": {"axis": annotation},
-        "axis": (0.0, 0.0, 1.0),
-        "freedoms": ("rotation",),
-    }
+    body = {"__annotations__": {"axis": annotation}, "axis": Z, "freedoms": ("rotation",)}
     with pytest.raises(
         MechanismError, match=r"Mine: axis holds several numbers, .*; declare it as axis: ... = pos"
     ):
@@ -260,10 +258,7 @@ def test_joint_without_measure_is_undrivable(monkeypatch):
                 i, j
             )
 
-    hinge, point = (
-        Unmeasured("h", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-        Point("p", "a", (1.0, 0.0, 0.0)),
-    )
+    hinge, point = (Unmeasured("h", "ground", "a", ORIGIN, Z), Point("p", "a", X))
     with pytest.raises(
         SolveError,
         match=(
@@ -271,9 +266,7 @@ def test_joint_without_measure_is_undrivable(monkeypatch):
         ),
     ):
         solve(Mechanism("m", [Body("a")], [hinge], [point], [JointAngle("t", "h")]), "t", [0.0])
-    driven = Mechanism(
-        "m", [Body("a")], [hinge], [point], [PointCoordinate("t", "p", (0.0, 1.0, 0.0))]
-    )
+    driven = Mechanism("m", [Body("a")], [hinge], [point], [PointCoordinate("t", "p", Y)])
     assert solve(driven, "t", [0.5]).points["p"].position[0] == pytest.approx(
         [0.75**0.5, 0.5, 0.0], abs=1e-15
     )

@@ -7,22 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters
-from kincheck.core import (
+from kincheck import (
     Body,
+    Case,
     Gear,
     InPlane,
     JointAngle,
     JointDisplacement,
     Mechanism,
     MechanismError,
+    Outcome,
     Planar,
     Point,
     Revolute,
+    adapters,
     solve,
 )
-from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
-from kincheck.core.harness.record import Outcome
+from kincheck.core.case.case import Output, Series, Sweep, Truth
 from kincheck.core.harness.run import run
 from kincheck.core.kinematics import styles
 from kincheck.core.trajectory import QUANTITIES

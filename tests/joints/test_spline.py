@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from kincheck.core import MechanismError, Spline
+from kincheck import MechanismError, Spline
 
 from ..support.splines import through
 

@@ -23,14 +23,14 @@ from kincheck import (
 from kincheck.core.case.case import Output, Sweep, Truth
 from kincheck.core.mechanism.motions import Absolute
 
-from ..support.mechanisms import Z
+from ..support.mechanisms import ORIGIN, X, Y, Z
 
 DESIGNS = "kincheck.core.extensions.designs.design_batch"
 
 ARM = Mechanism(
     "arm",
     [Body("arm")],
-    [Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), Z)],
+    [Revolute("hinge", "ground", "arm", ORIGIN, Z)],
     [Point("tip", "arm", (0.8, 0.6, 0.0))],
     [PointCoordinate("y", "tip", (0.0, 2.0, 0.0), relative=False)],
 )
@@ -55,12 +55,9 @@ def test_absolute_motion_of_second_driver():
     sleeve = Mechanism(
         "sleeve",
         [Body("sleeve")],
-        [Cylindrical("sleeve", "ground", "sleeve", (0.0, 0.0, 0.0), Z)],
+        [Cylindrical("sleeve", "ground", "sleeve", ORIGIN, Z)],
         [Point("tip", "sleeve", (0.8, 0.6, 0.5))],
-        [
-            PointCoordinate("y", "tip", (0.0, 1.0, 0.0)),
-            PointCoordinate("z", "tip", Z, relative=False),
-        ],
+        [PointCoordinate("y", "tip", Y), PointCoordinate("z", "tip", Z, relative=False)],
     )
     times = np.linspace(0.0, 0.2, 5)
     wave = Sine(0.5, 1.0, np.pi / 2.0)  # 0.5 at time zero
@@ -95,8 +92,7 @@ def test_sensitivity_of_absolute_and_relative_drivers():
     """
     diagnose = pytest.importorskip("kincheck.core.extensions.explain.diagnose").diagnose
     outputs = tuple(
-        Output(name, "tip", along, False, 1e-9, 0.0, "test")
-        for name, along in (("x", (1, 0, 0)), ("y", (0, 1, 0)))
+        Output(name, "tip", along, False, 1e-9, 0.0, "test") for name, along in (("x", X), ("y", Y))
     )
     for relative, expected in ((False, {"x": 0.6, "y": 0.0}), (True, {"x": 0.6 - 0.7, "y": 1.0})):
         mechanism = replace(ARM, drivers=[replace(ARM.drivers[0], relative=relative)])

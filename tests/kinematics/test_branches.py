@@ -21,18 +21,12 @@ from kincheck.core.primitives import GROUND_POSE, Drive, Pose
 
 from ..oracles import naive
 from ..support.mechanisms import ORIGIN, solve_all
-from ..support.specimens import LANES, MAKERS, admissible, body, make, rotation
+from ..support.specimens import LANES, MAKERS, SPURIOUS, admissible, body, make, rotation
 
 
 @pytest.fixture
 def rng():
     return np.random.default_rng(943745)
-
-
-SPURIOUS = [rotation(axis, np.pi) for axis in (X, Y, Z)] + [
-    rotation((1.0 / np.sqrt(3.0)) * Vec3(a, b, c), 2.0 * np.pi / 3.0)
-    for a, b, c in ((1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))
-]
 
 
 @pytest.mark.parametrize("turn", SPURIOUS, ids=["x", "y", "z", "+++", "+--", "-+-", "--+"])

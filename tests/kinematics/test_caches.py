@@ -26,7 +26,7 @@ from kincheck.core.mechanism.motions import Absolute, Motion, Path
 from kincheck.core.program.executor import compiler
 
 from ..support.fakes import calls
-from ..support.mechanisms import chain, mcpherson, solve_all
+from ..support.mechanisms import X, chain, mcpherson, solve_all
 
 DESIGNS = "kincheck.core.extensions.designs.design_batch"
 
@@ -317,7 +317,7 @@ class Foreign(Output):
 
 def wanted(kind):
     """A wanted output of the strut, of a class."""
-    return WantedOutput(kind("wheel_x", "wheel", (1.0, 0.0, 0.0), True, 1e-9, 0.0, "test"))
+    return WantedOutput(kind("wheel_x", "wheel", X, True, 1e-9, 0.0, "test"))
 
 
 @pytest.mark.needs("llvm")

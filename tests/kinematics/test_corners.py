@@ -19,7 +19,7 @@ from kincheck import (
 )
 from kincheck.core.kinematics import styles
 
-from ..support.mechanisms import ORIGIN, Z, circles_meet, planar_four_bar, solve_all
+from ..support.mechanisms import ORIGIN, X, Z, circles_meet, planar_four_bar, solve_all
 
 ROD = 0.8
 
@@ -161,7 +161,7 @@ def test_gap_verdict_ignores_wanted_points():
     """The crank's own motion is smooth, whatever the rocker does."""
     mechanism = loop(np.pi - 1.0, 1e-7, rod=1.2 - 1e-10, rocker=0.8)
     turn = np.linspace(0.0, 2.0, 300)
-    pinned = replace(mechanism, points=[Point("pin", "crank", (1.0, 0.0, 0.0))])
+    pinned = replace(mechanism, points=[Point("pin", "crank", X)])
     whole, crank = (solve(each, "turn", turn) for each in (mechanism, pinned))
     assert not whole.solved.all()
     np.testing.assert_array_equal(crank.solved, whole.solved)

@@ -23,7 +23,7 @@ from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.structure.degrees_of_freedom import DENSE, account
 
 from ..support.case_texts import write
-from ..support.mechanisms import Z, chain, slider_crank
+from ..support.mechanisms import ORIGIN, X, Z, chain, slider_crank
 
 LOOPS = 14  # 29 bodies
 WELDED = DENSE + 1
@@ -67,14 +67,14 @@ def test_freedom_count_of_free_balls(count):
 
 
 def test_freedom_count_with_gear():
-    axles = [Revolute(name, "ground", name, (0.0, 0.0, 0.0), Z) for name in ("first", "second")]
+    axles = [Revolute(name, "ground", name, ORIGIN, Z) for name in ("first", "second")]
     bodies, mesh = [Body("first"), Body("second")], Gear("mesh", ("first", "second"), -2.0)
     assert degrees_of_freedom(large(Mechanism("gears", bodies, axles, couplers=[mesh]))) == 1
     assert degrees_of_freedom(large(Mechanism("gears", bodies, axles))) == 2
 
 
 def test_driver_locked_at_design_is_accepted():
-    push = PointCoordinate("push", "end", (1.0, 0.0, 0.0))
+    push = PointCoordinate("push", "end", X)
     require_driven(large(replace(slider_crank(), drivers=[push])))
 
 

@@ -42,7 +42,7 @@ from kincheck.core.kinematics.one_design import prepare as prepare_one
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.motions import Path
 
-from ..support.mechanisms import X, Z
+from ..support.mechanisms import ORIGIN, X, Z
 
 BEND = 0.8  # cosine of the angle between the shafts
 
@@ -54,7 +54,7 @@ def shafts(bend=BEND):
         "shafts",
         [Body("first", mass=1.0), Body("second", mass=1.0)],
         [
-            Revolute("a", "ground", "first", (0.0, 0.0, 0.0), X),
+            Revolute("a", "ground", "first", ORIGIN, X),
             Universal("u", "first", "second", X, (Z, (-across, bend, 0.0))),
             Cylindrical("b", "ground", "second", (1 + bend, across, 0.0), (bend, across, 0.0)),
         ],
@@ -135,7 +135,7 @@ def test_angle_at_fold_adds_no_turn():
         "crank",
         [Body("crank"), Body("rod"), Body("slide")],
         [
-            Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), Z),
+            Revolute("pivot", "ground", "crank", ORIGIN, Z),
             Spherical("pin", "crank", "rod", (0.6, 0.8, 0.0)),
             Revolute("wrist", "rod", "slide", (2.1, 0.8, 0.0), Z),
             Translational("guide", "ground", "slide", (2.1, 0.8, 0.0), X),
@@ -182,7 +182,7 @@ MECHANISM = with_markers(
         "tumbler",
         [Body("disc"), Body("arm")],
         [
-            Revolute("hinge", "ground", "disc", (1.0, 0.0, 0.0), tuple(AXES[0])),
+            Revolute("hinge", "ground", "disc", X, tuple(AXES[0])),
             Revolute("elbow", "disc", "arm", (1.0, 1.0, 0.0), tuple(AXES[1])),
         ],
         [],
@@ -264,10 +264,7 @@ def test_orientation_of_fast_geared_wheel(sweep):
     mechanism = Mechanism(
         "gear",
         [Body("slow"), Body("wheel")],
-        [
-            Revolute("drive", "ground", "slow", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-            Revolute("spin", "ground", "wheel", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-        ],
+        [Revolute("drive", "ground", "slow", ORIGIN, Z), Revolute("spin", "ground", "wheel", X, Z)],
         [],
         [JointAngle("turn", "drive")],
         couplers=[Gear("mesh", ("drive", "spin"), 1.0 / 32.0)],

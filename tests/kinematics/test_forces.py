@@ -315,8 +315,8 @@ def test_design_forces_agree_in_both_ways(case, monkeypatch, way):
     assert sorted(found.alone) == [0, 1, 2]
     for measure in (
         lambda forces: forces.drivers["crank"],
-        lambda forces: forces.joints["gudgeon"].along((1.0, 0.0, 0.0)),
-        lambda forces: forces.joints["crank_pin"].along((0.0, 0.0, 1.0), moment=True),
+        lambda forces: forces.joints["gudgeon"].along(X),
+        lambda forces: forces.joints["crank_pin"].along(Z, moment=True),
     ):
         values, expected = found.read(measure), right.read(measure)
         scale = np.nanmax(np.abs(expected), initial=0.0) or 1.0

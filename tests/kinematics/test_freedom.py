@@ -30,7 +30,9 @@ from kincheck.core.kinematics.structure.degrees_of_freedom import account
 from ..support.mechanisms import (
     CRANK,
     D0,
+    ORIGIN,
     ROD,
+    Z,
     four_bar,
     mcpherson,
     placed,
@@ -116,8 +118,8 @@ def test_contradicting_redundant_rows_are_refused():
     violated beyond.
     """
     guided = [
-        Translational("guide", "ground", "slider", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        Distance("rod", "ground", "slider", ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))),
+        Translational("guide", "ground", "slider", ORIGIN, (1.0, 0.0, 0.0)),
+        Distance("rod", "ground", "slider", (Z, ORIGIN)),
     ]
     m = Mechanism("m", [Body("slider")], guided, [], [JointDisplacement("push", "guide")])
     assert account_of(m).redundant_rows == ("rod: Distance",)
@@ -161,7 +163,7 @@ PUSH, FREE, OVER = JointDisplacement("push", "guide"), FailureKind.FREE, Failure
 SKEW = Revolute("D", "ground", "rocker", D0, (1e-6, 1.0, 0.0))
 SHORT = Distance("rod", "crank", "slider", ((CRANK, 0.0, 0.0), (CRANK + ROD, 2.0, 0.0)), 1.0)
 AXLES = [
-    Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0))
+    Revolute(name, "ground", name, (x, 0.0, 0.0), Z)
     for name, x in (("a", 0.0), ("b", 1.0), ("c", 2.0))
 ]
 TWICE = [JointAngle("first", "a"), JointAngle("second", "a"), JointAngle("sound", "b")]
@@ -200,7 +202,7 @@ REFUSED = {
         r"driver 'push' does not move it .*dead",
     ),
     "across a guide": (
-        replace(SLIDER, drivers=[PointCoordinate("lift", "end", (0.0, 0.0, 1.0))]),
+        replace(SLIDER, drivers=[PointCoordinate("lift", "end", Z)]),
         STUCK,
         "'lift'",
     ),
@@ -232,7 +234,7 @@ def test_drivers_of_same_freedom():
     m = mechanism_of(
         Revolute("r", "ground", "a", A, X),
         Revolute("s", "ground", "b", A, X),
-        drivers=[JointAngle("turn", "r"), PointCoordinate("again", "tip", (0.0, 0.0, 1.0))],
+        drivers=[JointAngle("turn", "r"), PointCoordinate("again", "tip", Z)],
     )
     solve_all(m, "turn", [0.0, 0.1])
     same = replace(m, points=[Point("tip", "a", B)])

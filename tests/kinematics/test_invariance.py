@@ -26,6 +26,7 @@ from kincheck.core.kinematics.formulation.constraints import frames
 
 from ..support.mechanisms import (
     ORIGIN,
+    Y,
     Z,
     mcpherson,
     placed,
@@ -187,7 +188,7 @@ def test_length_unit_of_single_joint(size, joint):
         [joint],
         [Point("P", "a", (size, 0.0, 0.0)), Point("O", "a", ORIGIN)],
         [
-            PointCoordinate("y", "P", (0.0, 1.0, 0.0)),
+            PointCoordinate("y", "P", Y),
             *(PointCoordinate(f"at {k}", "O", tuple(axis)) for k, axis in enumerate(free)),
         ],
     )

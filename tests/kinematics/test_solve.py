@@ -32,6 +32,8 @@ from kincheck.core.trajectory import Motions
 
 from ..oracles import naive
 from ..support.mechanisms import (
+    ORIGIN,
+    Y,
     errors,
     four_bar,
     mcpherson,
@@ -113,7 +115,7 @@ def jack():
             Body("slider", (1.5, 0.4, 0.0)),
         ],
         [
-            Revolute("bearing", "ground", "screw", (0.0, 0.0, 0.0), (1.0, 0.2, 0.1)),
+            Revolute("bearing", "ground", "screw", ORIGIN, (1.0, 0.2, 0.1)),
             Screw("thread", "screw", "nut", (0.3, 0.06, 0.03), (1.0, 0.2, 0.1), 0.15),
             Cylindrical("keeper", "ground", "nut", (0.0, 0.3, 0.0), (1.0, 0.2, 0.1)),
             Distance("rod", "nut", "slider", ((0.4, 0.1, 0.1), (1.4, 0.4, 0.0))),
@@ -340,7 +342,7 @@ def test_solve_refuses_bad_arguments(arguments, message):
 def steered():
     """The strut with a rack that can slide."""
     base = mcpherson()
-    rack = Translational("rack_guide", "chassis", "rack", (1.14, 0.0, 0.1455), (0.0, 1.0, 0.0))
+    rack = Translational("rack_guide", "chassis", "rack", (1.14, 0.0, 0.1455), Y)
     bodies = [replace(body, fixed=body.name == "chassis") for body in base.bodies]
     return replace(
         base,
@@ -366,9 +368,7 @@ def test_driven_displacement():
     bodies = [body.name for body in mechanism.moving]
     found = solve_all(mechanism, "steer", values, rate=0.2, bodies=bodies)
     rack = found.bodies["rack"]
-    assert rack.r - (1.14, 0.0, 0.1455) == pytest.approx(
-        np.outer(values, (0.0, 1.0, 0.0)), abs=1e-16
-    )
+    assert rack.r - (1.14, 0.0, 0.1455) == pytest.approx(np.outer(values, Y), abs=1e-16)
     assert rack.v == pytest.approx(np.tile((0.0, 0.2, 0.0, 0.0, 0.0, 0.0), (9, 1)), abs=1e-15)
     assert np.abs(found.points["wheel"].position[:, 2] - 0.101).max() <= 2e-16
     for k in range(len(values)):

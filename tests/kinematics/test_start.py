@@ -33,7 +33,7 @@ from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Path
 
 from ..support.block_structures import solve_components, solve_sparse
-from ..support.mechanisms import X, chain, errors, slider_crank
+from ..support.mechanisms import ORIGIN, X, Y, chain, errors, slider_crank
 
 DESIGNS = "kincheck.core.extensions.designs.design_batch"
 
@@ -60,14 +60,14 @@ def arm(degrees, *, relative=False):
         "arm",
         [Body("a"), Body("b"), Body("rack")],
         [
-            Revolute("h", "ground", "a", (0.0, 0.0, 0.0), Z),
+            Revolute("h", "ground", "a", ORIGIN, Z),
             Revolute("k", "a", "b", joint, Z),
             Translational("s", "ground", "rack", (0.0, -1.0, 0.0), X),
         ],
         [Point("tip", "b", at), Point("r", "rack", (0.0, -1.0, 0.0))],
         [
             PointCoordinate("x", "tip", X, relative=relative),
-            PointCoordinate("y", "tip", (0.0, 1.0, 0.0), relative=relative),
+            PointCoordinate("y", "tip", Y, relative=relative),
         ],
         [RackPinion("rp", ("h", "s"), RADIUS)],
     )
@@ -385,7 +385,7 @@ def test_written_start_is_reached():
     mechanism = turned_arm(60.0)
     case = case_of(mechanism, {"u": Sine(9.0, 0.1, 1.5), "v": Ramp(0.1)})
     way = way_to(case, 0.5)
-    assert way["rack"].r[0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)
+    assert way["rack"].r[0] == pytest.approx(ORIGIN, abs=1e-15)
     assert way["a"].p[0] == pytest.approx((1.0, 0.0, 0.0, 0.0), abs=1e-15)
     assert way["rack"].r[-1, 0] == pytest.approx(
         RADIUS * case.sweep.motions["u"].at(np.array([0.5]))[0][0], abs=1e-12

@@ -27,8 +27,11 @@ from kincheck.core.mechanism.motions import Path
 
 from ..support.mechanisms import (
     CRANK,
+    ORIGIN,
     ROD,
+    X,
     Y,
+    Z,
     errors,
     four_bar,
     four_bar_motion,
@@ -154,8 +157,8 @@ def test_relative_angle_of_moving_bodies():
         "arms",
         [Body("upper"), Body("lower")],
         [
-            Revolute("shoulder", "ground", "upper", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-            Revolute("elbow", "lower", "upper", (1.0, 0.0, 0.0), (0.0, 0.0, 2.0)),
+            Revolute("shoulder", "ground", "upper", ORIGIN, Z),
+            Revolute("elbow", "lower", "upper", X, (0.0, 0.0, 2.0)),
         ],
         [Point("hand", "lower", (2.0, 0.0, 0.0))],
         [JointAngle(name, name) for name in ("shoulder", "elbow")],
@@ -191,12 +194,12 @@ def test_arm_on_ball_and_rods():
         "fork",
         [Body("arm")],
         [
-            Spherical("ball", "ground", "arm", (0.0, 0.0, 0.0)),
+            Spherical("ball", "ground", "arm", ORIGIN),
             Distance("stay", "ground", "arm", ((0.0, 2.0, 1.0), (0.0, 2.0, 0.0))),
             Distance("brace", "ground", "arm", ((1.0, 2.0, 0.0), (0.0, 2.0, 0.0))),
         ],
         [Point("tip", "arm", (0.5, 0.0, 0.0))],
-        [PointCoordinate("lift", "tip", (0.0, 0.0, 1.0))],
+        [PointCoordinate("lift", "tip", Z)],
     )
     heights = np.linspace(-0.45, 0.45, 19)
     tip = solve(m, "lift", heights).points["tip"]

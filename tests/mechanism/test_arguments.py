@@ -24,7 +24,7 @@ from kincheck import (
 )
 from kincheck.core.mechanism.motions import Motion
 
-from ..support.mechanisms import chain, mcpherson
+from ..support.mechanisms import ORIGIN, X, Z, chain, mcpherson
 
 VALUES = np.linspace(-0.01, 0.01, 3)
 NO_NUMBERS = (None, "x", 1j, np.complex128(1.0), np.array([1.0 + 0.0j]), [1.0, 2.0])
@@ -85,12 +85,12 @@ def test_order_may_be_numpy_float(who):
 
 
 def test_complex_coordinates_are_refused():
-    at, off = (0.0, 0.0, 0.0), (0.0, np.complex128(1.0), 1j)
+    at, off = ORIGIN, (0.0, np.complex128(1.0), 1j)
     for call in (
         partial(Body, "a", origin=off),
         partial(Point, "p", "a", off),
         partial(Revolute, "r", "ground", "a", point=at, axis=off),
-        partial(Distance, "d", "ground", "a", points=(at, (1.0, 0.0, 0.0)), length=1j),
+        partial(Distance, "d", "ground", "a", points=(at, X), length=1j),
     ):
         with pytest.raises(MechanismError, match="is not finite; give a "):
             call()
@@ -119,10 +119,7 @@ def with_an_arm(loops):
     return replace(
         there,
         bodies=[*there.bodies, Body("arm")],
-        joints=[
-            *there.joints,
-            Revolute("shoulder", "ground", "arm", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
-        ],
+        joints=[*there.joints, Revolute("shoulder", "ground", "arm", Z, Z)],
         points=[Point("hand", "arm", (1.0, 0.0, 1.0))],
         drivers=[*there.drivers, JointAngle("swing", "shoulder")],
     )
@@ -163,7 +160,7 @@ def test_name_argument_of_wrong_kind():
 
 
 def test_mechanism_member_of_wrong_kind():
-    body, hinge = Body("arm"), Revolute("hinge", "ground", "arm", (0, 0, 0), (0, 0, 1))
+    body, hinge = Body("arm"), Revolute("hinge", "ground", "arm", ORIGIN, Z)
     for bodies, joints, found in (
         ([hinge], [body], "bodies has Revolute"),
         ("arm", [hinge], "bodies is 'arm', expected a list"),

@@ -14,7 +14,7 @@ from kincheck.core.mechanism.loads import (
     TorsionSpringDamper,
 )
 
-from ..support.mechanisms import ORIGIN, X
+from ..support.mechanisms import ORIGIN, X, Z
 
 BALL = (2.0, 2.0, 2.0, 0.0, 0.0, 0.0)
 APART = (ORIGIN, (0.0, 3.0, 4.0))
@@ -92,7 +92,7 @@ def test_spring_free_length_defaults_to_design():
 
 
 def test_force_element_with_unknown_name():
-    hinge = Revolute("hinge", "ground", "a", ORIGIN, (0.0, 0.0, 1.0))
+    hinge = Revolute("hinge", "ground", "a", ORIGIN, Z)
     ball = Spherical("ball", "ground", "b", ORIGIN)
     bodies = [Body("a"), Body("b")]
 

@@ -99,38 +99,38 @@ WRONG = [
         "position = ('1', '2', '3') is not finite; give a point",
     ),
     (
-        lambda: Revolute("a", "b", "c", (0, 0, 0), (0, 0, 1e-200)),
+        lambda: Revolute("a", "b", "c", ORIGIN, (0, 0, 1e-200)),
         "axis has length 1e-200, whose square",
     ),
-    (lambda: PointCoordinate("d", "P", (0, 0, 0)), "driver 'd': direction is zero"),
+    (lambda: PointCoordinate("d", "P", ORIGIN), "driver 'd': direction is zero"),
     (lambda: Ramp("a"), "ramp motion: rate is 'a'; give a finite number"),
     (
-        lambda: Revolute("a", "b", "c", (0, 0, 0), None),
+        lambda: Revolute("a", "b", "c", ORIGIN, None),
         "joint 'a' (revolute): axis is None, expected a direction",
     ),
     (
-        lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), -4.0),
+        lambda: Distance("a", "b", "c", (ORIGIN, (0.4, 0, 0)), -4.0),
         (
             "length is -4 m, expected a positive one; the points are 0.4 m apart at design, which"
             " is the length where none is given"
         ),
     ),
     (
-        lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), 0.0),
+        lambda: Distance("a", "b", "c", (ORIGIN, (0.4, 0, 0)), 0.0),
         "length is 0 m, expected a positive one",
     ),
-    (lambda: Distance("a", "b", "c", ((1, 0, 0), (1, 0, 0)), 2.0), "the points coincide at design"),
+    (lambda: Distance("a", "b", "c", (X, X), 2.0), "the points coincide at design"),
     (
-        lambda: PerpendicularAxes("a", "b", "c", ((1, 0, 0), (0.02, 1, 0))),
+        lambda: PerpendicularAxes("a", "b", "c", (X, (0.02, 1, 0))),
         "joint 'a' (perpendicular_axes): the axes are not perpendicular, the cosine of their angle"
         " is 0.02",
     ),
     (
-        lambda: Universal("a", "b", "c", (0, 0, 0), ((1, 0, 0), (-0.02, 1, 0))),
+        lambda: Universal("a", "b", "c", ORIGIN, (X, (-0.02, 1, 0))),
         "joint 'a' (universal): the axes are not perpendicular, the cosine of their angle is -0.02",
     ),
     (
-        lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), None),
+        lambda: Screw("a", "b", "c", ORIGIN, (0, 0, 1), None),
         "joint 'a' (screw): lead is None, expected a length",
     ),
     (
@@ -138,7 +138,7 @@ WRONG = [
         "point = ([0.0], [0.0], [0.0]) is not",
     ),
     (
-        lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), [1.0]),
+        lambda: Screw("a", "b", "c", ORIGIN, (0, 0, 1), [1.0]),
         "lead = [1.0] is not finite; give a length",
     ),
     (lambda: Gear("g", ("a", "b"), ratio=np.array(1 + 2j)), "ratio = (1+2j) is not finite"),
@@ -173,12 +173,12 @@ def test_scalar_array_becomes_number():
     """It may change, and has no hash."""
     lead, ratio = np.array(0.5), np.array([2.0])
     screw, gear = (
-        Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), lead),
+        Screw("a", "b", "c", ORIGIN, (0, 0, 1), lead),
         Gear("g", ("a", "b"), ratio=ratio),
     )
     lead[...] = ratio[...] = 7.0
     assert (screw.lead, gear.ratio) == (0.5, 2.0)
-    assert hash(screw) == hash(Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), 0.5))
+    assert hash(screw) == hash(Screw("a", "b", "c", ORIGIN, (0, 0, 1), 0.5))
 
 
 def held(*joints, drivers=(), couplers=()):
@@ -269,9 +269,7 @@ def test_unknown_name_suggests_similar(kind):
 
 def test_pickled_mechanism_holds_fields_only():
     bodies = [Body("turned")]
-    mechanism = Mechanism(
-        "arm", bodies, [Revolute("pivot", "ground", "turned", (0, 0, 0), (0, 0, 1))]
-    )
+    mechanism = Mechanism("arm", bodies, [Revolute("pivot", "ground", "turned", ORIGIN, (0, 0, 1))])
     packed = pickle.dumps(mechanism)
     assert hash(mechanism) == hash(replace(mechanism))
     assert mechanism.moving  # kept for the next question

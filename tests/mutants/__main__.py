@@ -154,8 +154,12 @@ def _run(mutant: Mutant, sandbox: Sandbox, tests: Sequence[str], entered: Entere
     while tests:
         with sandbox.changed(mutant):
             run = sandbox.run(tests, limit)
-            if run.outcome == "unknown":  # names of tests come from the changed code
-                run = sandbox.run(_files(tests), limit)
+            if run.outcome == "unknown":  # some names of tests come from the changed code
+                every = {test: test.partition("[")[0] for test in tests}
+                found = (
+                    each if f"{each}\n" in run.output else test for test, each in every.items()
+                )
+                run = sandbox.run([*dict.fromkeys(found)], limit)
             if not run.failing:
                 return run
             again = sandbox.run(run.failing, limit).outcome != "passed"
@@ -163,10 +167,6 @@ def _run(mutant: Mutant, sandbox: Sandbox, tests: Sequence[str], entered: Entere
             return run
         tests = [test for test in tests if test not in run.failing]
     return Run("passed", (), "")
-
-
-def _files(tests: Sequence[str]) -> list[str]:
-    return [*dict.fromkeys(test.partition("::")[0] for test in tests)]
 
 
 def harmless(mutant: Mutant) -> str:

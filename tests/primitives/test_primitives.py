@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from kincheck.core import primitives as p
 from kincheck.core.algebra import Vec3
-from kincheck.core.primitives.base import GROUND_POSE, Drive, Primitive
+from kincheck.core.primitives import GROUND_POSE, Drive, Primitive
 
 from ..support.specimens import (
     MAKERS,

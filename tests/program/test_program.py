@@ -12,14 +12,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from kincheck.core.algebra import root
-from kincheck.core.program import (
-    Tape,
-    absolute,
-    maximum,
-    minimum,
-    program,
-    where_larger,
-)
+from kincheck.core.program import Tape, absolute, maximum, minimum, program, where_larger
 
 from ..support.program_blocks import numpy_executor, run_on
 

@@ -33,6 +33,7 @@ from kincheck.core.report.drawing import drawing
 from msgspec.structs import replace as replaced
 
 from ..oracles.naive import A
+from ..support.mechanisms import ORIGIN, X, Z
 from ..support.strut_results import GRID, STROKE, record
 
 STRUT = cases.load("mcpherson_strut")
@@ -185,11 +186,11 @@ def dead_centre():
         "short",
         [Body("crank"), Body("rocker")],
         [
-            Revolute("a", "ground", "crank", (0, 0, 0), (0, 0, 1)),
-            Revolute("b", "ground", "rocker", (3, 0, 0), (0, 0, 1)),
-            Distance("rod", "crank", "rocker", ((1, 0, 0), (3, 1, 0))),
+            Revolute("a", "ground", "crank", ORIGIN, Z),
+            Revolute("b", "ground", "rocker", (3, 0, 0), Z),
+            Distance("rod", "crank", "rocker", (X, (3, 1, 0))),
         ],
-        [Point("pin", "crank", (1, 0, 0))],
+        [Point("pin", "crank", X)],
         [JointAngle("turn", "a")],
     )
     return Case(

@@ -17,13 +17,23 @@ from pathlib import Path
 
 import kincheck.core
 import pytest
-from kincheck import adapters
-from kincheck.core import Body, Gear, InPlane, Joint, Revolute, Spherical, Universal, check_joint
+from kincheck import (
+    Body,
+    Gear,
+    InPlane,
+    Joint,
+    KincheckError,
+    MechanismError,
+    Revolute,
+    Spherical,
+    Universal,
+    adapters,
+    check_joint,
+    clear_caches,
+)
 from kincheck.core import primitives as p
-from kincheck.core.caches import clear_caches
 from kincheck.core.cli.joint_loading import load_joint, sources
 from kincheck.core.cli.main import main
-from kincheck.core.errors import KincheckError, MechanismError
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.joints import AxialJoint
 from kincheck.core.studies.checks.findings import Verdict
@@ -187,7 +197,7 @@ def test_check_joint_report_names_unchecked(few):
     report = check_joint(InPlane)
     skipped = {each.check: each.message for each in report.findings if each.verdict is Verdict.SKIP}
     assert set(skipped) == {
-        *("exchange", "mixed style", "driver", "loop: simulators", "driven reaction"),
+        *("exchange", "mixed style", "driver", "loop: simulators", "driven reaction")
     }
     assert all(skipped.values())
     text = str(report)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 import pytest
-from kincheck.core import (
+from kincheck import (
     ConstantVelocity,
     Cylindrical,
     InPlane,
@@ -218,8 +218,7 @@ MISTAKES = {
     "a row twice": (
         "rank",
         lambda: composed(
-            Revolute,
-            lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot10(f, h), p.Dot10(h, f)),
+            Revolute, lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot10(f, h), p.Dot10(h, f))
         ),
     ),
     "a freedom too many": (
@@ -251,8 +250,7 @@ MISTAKES = {
     "a length that is none": (
         "size",
         lambda: composed(
-            InPlane,
-            lambda arms, *axes: [p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in axes[:2]],
+            InPlane, lambda arms, *axes: [p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in axes[:2]]
         ),
     ),
     "called symmetric": ("exchange", lambda: mistaken(InPlane, symmetric=True)),

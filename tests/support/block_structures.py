@@ -1,11 +1,14 @@
 """One mechanism solved as one program, component by component, and as one sparse system."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from kincheck import Body, Inline, JointAngle, Mechanism, Point, Revolute, Spherical
 from kincheck.core.kinematics import Method, NativeSolver
+
+from .mechanisms import Z, chain
 
 
 def solve_as(method, mechanism, path, points=(), bodies=(), order=2, tol=1e-12, *, compiled=True):
@@ -52,20 +55,9 @@ def assert_alike(found, expected):
 
 def chain_of_hinges(loops):
     """Return a chain of four-bars whose joints are all hinges: three redundant rows a loop."""
-    LEAN = pytest.importorskip("kincheck.core.extensions.laboratory.bench.size").LEAN
-    n, s, c, up = range(loops), math.sin(LEAN), math.cos(LEAN), (0.0, 0.0, 1.0)
-    pivots = [
-        Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), up)
-        for k in range(loops + 1)
-    ]
-    pins = [
-        Revolute(f"{at}{k}", f"crank{k + at}", f"coupler{k}", (k + at + s, c, 0.0), up)
-        for k in n
-        for at in (0, 1)
-    ]
-    bodies = [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)]
-    points = [Point("end", f"crank{loops}", (loops + s, c, 0.0))]
-    return Mechanism("chain", bodies, [*pivots, *pins], points, [JointAngle("turn", "pivot0")])
+    made = chain(loops)
+    hinges = [Revolute(each.name, *each.bodies, each.point, Z) for each in made.joints]
+    return replace(made, joints=hinges)
 
 
 def torus(rows, columns):
@@ -80,8 +72,7 @@ def torus(rows, columns):
     cranks = [(i, j) for i in range(rows) for j in range(columns)]
     at = {(i, j): (size.pivot(i, rows), 1.37 * size.pivot(j, columns)) for i, j in cranks}
     tip = {k: (x + math.sin(size.LEAN), y + math.cos(size.LEAN), 0.0) for k, (x, y) in at.items()}
-    up = (0.0, 0.0, 1.0)
-    joints = [Revolute(f"pivot{k}", "ground", f"crank{k}", (*at[k], 0.0), up) for k in cranks]
+    joints = [Revolute(f"pivot{k}", "ground", f"crank{k}", (*at[k], 0.0), Z) for k in cranks]
     for i, j in cranks[1:]:
         k = i, j
         joints.append(Spherical(f"ball{k}", f"crank{k}", f"plate{k}", tip[k]))
@@ -90,7 +81,7 @@ def torus(rows, columns):
             ("above", (i, (j + 1) % columns), 0.25),
         ):
             x, y, _ = tip[to]
-            joints.append(Inline(f"{name}{k}", f"crank{to}", f"plate{k}", (x, y, height), up))
+            joints.append(Inline(f"{name}{k}", f"crank{to}", f"plate{k}", (x, y, height), Z))
     bodies = [Body(f"crank{k}") for k in cranks] + [Body(f"plate{k}") for k in cranks[1:]]
     far = rows // 2, columns // 2
     points = [Point("tip", f"crank{far}", tip[far])]

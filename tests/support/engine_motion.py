@@ -28,7 +28,7 @@ from kincheck.core.case.case import TIME, Output, Sweep, Truth
 from kincheck.core.mechanism.tree import SpanningTree, spanning_tree
 
 from .joint_loops import TYPES
-from .mechanisms import X
+from .mechanisms import ORIGIN, X, Z
 
 TOL = 1e-12
 TREES = tuple(
@@ -194,7 +194,7 @@ CRANK_PIN = 0.1 * np.stack([np.cos(CRANK_TURN), np.sin(CRANK_TURN), 0 * CRANK_TU
 B0 = np.array([[0.1, 0.0, 0.0]])
 C0 = tuple(rocker(B0, 0.76)[0])
 RSSR = (
-    Revolute("a", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    Revolute("a", "ground", "crank", ORIGIN, Z),
     Revolute("c", "rocker", "ground", (0.6, 0.3, 0.1), X),
     Distance("rod", "crank", "rocker", (tuple(B0[0]), C0)),
 )

@@ -16,6 +16,8 @@ from kincheck.core.case.case import Sweep, Truth
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 
+from .mechanisms import ORIGIN, X, Z
+
 INERTIA = (0.5, 0.75, 1.0, 0.0625, -0.03125, 0.125)
 GRAVITY = (0.5, 0.0, -9.75)
 
@@ -32,8 +34,8 @@ def loaded(driver=None):
             Body("wall", fixed=True),
         ],
         joints=[
-            Revolute("pin", "ground", "crank", point=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
-            Translational("rail", "wall", "slider", point=(2.0, 0.5, 0.0), axis=(1.0, 0.0, 0.0)),
+            Revolute("pin", "ground", "crank", point=ORIGIN, axis=Z),
+            Translational("rail", "wall", "slider", point=(2.0, 0.5, 0.0), axis=X),
             Distance("rod", "crank", "slider", points=((0.0, 0.5, 0.0), (2.0, 0.5, 0.0))),
         ],
         points=[Point("tip", "slider", (2.0, 0.5, 0.25))],
@@ -56,7 +58,7 @@ def loaded(driver=None):
 
 def pushed():
     """Return the same, driven at its tip."""
-    return loaded(PointCoordinate("push_tip", "tip", (1.0, 0.0, 0.0)))
+    return loaded(PointCoordinate("push_tip", "tip", X))
 
 
 def case_of(mechanism):

@@ -43,14 +43,14 @@ def mcpherson():
             Body("rack", (1.14, 0.0, 0.1455), fixed=True),
         ],
         [
-            Revolute("lca_pivot", "chassis", "lca", (1.17, 0.353, 0.005), (1.0, 0.0, 0.0)),
+            Revolute("lca_pivot", "chassis", "lca", (1.17, 0.353, 0.005), X),
             Spherical("ball", "lca", "knuckle", (0.9676, 0.660, -0.010)),
             Spherical("strut_top", "strut", "chassis", top),
             Translational("slide", "knuckle", "strut", top, tuple(np.subtract(top, lower))),
             Distance("tie_rod", "knuckle", "rack", ((1.115, 0.665, 0.118), (1.14, 0.355, 0.1455))),
         ],
         [Point("wheel", "knuckle", wheel), Point("rod_end", "knuckle", (1.115, 0.665, 0.118))],
-        [PointCoordinate("stroke", "wheel", (0.0, 0.0, 1.0))],
+        [PointCoordinate("stroke", "wheel", Z)],
     )
 
 
@@ -66,9 +66,9 @@ def slider_crank(rod=None):
         "slider_crank",
         [Body("crank"), Body("slider", slider)],
         [
-            Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), Y),
             Distance("rod", "crank", "slider", (pin, slider), rod),
-            Translational("guide", "ground", "slider", slider, (1.0, 0.0, 0.0)),
+            Translational("guide", "ground", "slider", slider, X),
         ],
         [Point("pin", "crank", pin), Point("end", "slider", slider)],
         [JointAngle("turn", "pivot")],
@@ -89,7 +89,7 @@ def four_bar():
     """A planar crank-rocker of four spatial revolutes about y: three rows say what others say
     already.
     """
-    y = (0.0, 1.0, 0.0)
+    y = Y
     return Mechanism(
         "four_bar",
         [Body("crank"), Body("coupler"), Body("rocker")],

@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
+from .mechanisms import ORIGIN, X, Y, Z
 from .splines import through
 
 G, MASS, ARM, INERTIA, CLOCK = 9.81, 1.0, 0.3, 0.02, 20.0
@@ -48,8 +49,8 @@ class Subject:
 
 def _slide():
     return {
-        "bodies": {"slide": body((1.0, 0.0, 0.0), OTHER)},
-        "joints": {"rail": joint("translational", "slide", (1.0, 0.0, 0.0), (0, 0, 1))},
+        "bodies": {"slide": body(X, OTHER)},
+        "joints": {"rail": joint("translational", "slide", X, Z)},
         "points": {"end": {"body": "slide", "position": [1.0, 0.0, 0.0]}},
     }
 
@@ -57,7 +58,7 @@ def _slide():
 def _wheel():
     return {
         "bodies": {"wheel": body((1.0 + REACH, 0.0, 0.0), OTHER)},
-        "joints": {"axle": joint("revolute", "wheel", (1.0, 0.0, 0.0), (0, 1, 0))},
+        "joints": {"axle": joint("revolute", "wheel", X, Y)},
         "points": {"end": {"body": "wheel", "position": [1.0 + REACH, 0.0, 0.0]}},
     }
 
@@ -201,15 +202,15 @@ SUBJECTS = {
         line(-0.125),
         more={
             "bodies": {"idler": {}},
-            "joints": {"third": joint("revolute", "idler", (0.0, 0.5, 0.0), (0, 1, 0))},
+            "joints": {"third": joint("revolute", "idler", (0.0, 0.5, 0.0), Y)},
             "couplers": {"quarter": {"type": "gear", "joints": ["third", "pin"], "ratio": 0.25}},
         },
     ),
     "screw": Subject(
         "screw",
         {
-            "bodies": {"slide": body((1.0, 0.0, 0.0), OTHER)},
-            "joints": {"rail": joint("screw", "slide", (1.0, 0.0, 0.0), (0, 0, 1), lead=0.5)},
+            "bodies": {"slide": body(X, OTHER)},
+            "joints": {"rail": joint("screw", "slide", X, Z, lead=0.5)},
             "points": {"end": {"body": "slide", "position": [1.0, 0.0, 0.0]}},
             "couplers": {"x": {"type": "gear", "joints": ["rail", "pin"], "ratio": 2.0}},
         },
@@ -279,7 +280,7 @@ def case_of(subject, **more):
     crank = body((ARM, 0.0, 0.0), MASS, INERTIA)
     parts = {
         "bodies": {"crank": crank},
-        "joints": {"pin": joint("revolute", "crank", (0.0, 0.0, 0.0), (0, 1, 0))},
+        "joints": {"pin": joint("revolute", "crank", ORIGIN, Y)},
         "points": {"tip": {"body": "crank", "position": [ARM, 0.0, 0.0]}},
         "forces": {"clock": {"type": "torsion_spring_damper", "joint": "pin", "stiffness": CLOCK}},
         "drivers": {"turn": {"type": "joint_angle", "joint": "pin"}},

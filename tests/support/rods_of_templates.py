@@ -8,6 +8,7 @@ from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.harness.compare import output_series
 
 from ..oracles.rods import Carrier, rotation
+from .mechanisms import Y, Z
 
 DATA = Path(__file__).parents[1] / "data" / "hardpoints"
 # Round-off of a Newton step and of products of metre-sized numbers; quotients by the travel lose a
@@ -77,7 +78,7 @@ def arm_rate(carrier, at, arm, point):
     return place, rate * np.cross(axis, place - rear)
 
 
-def expected(name, at, travel, spin=(0.0, 1.0, 0.0)):
+def expected(name, at, travel, spin=Y):
     """Outputs at a wheel travel, by their definitions."""
     carrier = carrier_of(name, at).go(travel)
     center, s = carrier.at(at["wheel_center"]), carrier.direction(spin)
@@ -114,10 +115,10 @@ def expected(name, at, travel, spin=(0.0, 1.0, 0.0)):
         x, y, z = axis
         values |= {"caster": np.arctan2(-x, z), "kingpin_inclination": np.arctan2(-y, z)}
         meets = low + (contact[2] - low[2]) / z * axis - contact
-        heading = np.cross(s, (0.0, 0.0, 1.0))
+        heading = np.cross(s, Z)
         heading = heading / np.linalg.norm(heading)
         values |= {
             "mechanical_trail": meets @ heading,
-            "scrub_radius": meets @ np.cross(heading, (0.0, 0.0, 1.0)),
+            "scrub_radius": meets @ np.cross(heading, Z),
         }
     return values

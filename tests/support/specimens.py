@@ -9,7 +9,7 @@ from dataclasses import MISSING, dataclass, fields, replace
 
 import numpy as np
 from kincheck.core import primitives as p
-from kincheck.core.algebra import IDENTITY, ZERO, Quat, Vec3, cross
+from kincheck.core.algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross
 from kincheck.core.doors import extensions
 from kincheck.core.jet import Jet
 from kincheck.core.primitives import Drive, Pose, Primitive, Twist
@@ -76,6 +76,13 @@ def orientation(rng):
 
 def rotation(axis, angle):
     return Quat(np.cos(0.5 * angle), np.sin(0.5 * angle) * axis)
+
+
+SPURIOUS = [rotation(axis, np.pi) for axis in (X, Y, Z)] + [
+    rotation((1.0 / np.sqrt(3.0)) * Vec3(a, b, c), 2.0 * np.pi / 3.0)
+    for a, b, c in ((1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))
+]
+"""Rotations other than none at which the equations of a lock hold as well."""
 
 
 def frame(rng):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from kincheck.core import Joint
+from kincheck import Joint
 from kincheck.core.algebra import Scalar, Vec3, vec
 from kincheck.core.joints.base import direction, length, position, triad
 from kincheck.core.primitives import Primitive

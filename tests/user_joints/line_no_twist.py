@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from kincheck.core import Joint
+from kincheck import Joint
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.joints.base import direction, position, triad

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from kincheck.core import Body, Joint, Revolute, Translational
+from kincheck import Body, Joint, Revolute, Translational
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, cross, vec
 from kincheck.core.joints.base import directions, position, require_perpendicular, triad, unit

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from kincheck.core import Joint
+from kincheck import Joint
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, Scalar, Vec3, cross, vec
 from kincheck.core.joints.base import directions, length, position, require_perpendicular, unit

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from kincheck.core import Body, Joint, Revolute, Spherical
+from kincheck import Body, Joint, Revolute, Spherical
 from kincheck.core import primitives as p
 from kincheck.core.algebra import vec
 from kincheck.core.joints.base import direction, position, triad

@@ -1,12 +1,12 @@
 """Joints with equations of their own throughout: a telescope, and one with a thread."""
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from kincheck.core import Cylindrical
+from kincheck import Cylindrical
 from kincheck.core.algebra import ZERO, Vec3, cross, vec
-from kincheck.core.joints.base import AxialJoint, direction, length, position, triad, unit
+from kincheck.core.joints import AxialJoint
+from kincheck.core.joints.base import direction, length, position, triad, unit
 from kincheck.core.primitives import Drive, Primitive, Row
 
 
@@ -155,7 +155,7 @@ class Threaded(Telescope):
     lead: float = length()
 
     @property
-    def relations(self) -> Sequence[Mapping[str, float]]:
+    def relations(self):
         return ({"translation": 1.0, "rotation": -self.lead / (2.0 * math.pi)},)
 
     def equivalent(self):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,6 +42,6 @@ class Torus(Joint):
     major: float = length()
     minor: float = length()
 
-    def primitives(self, i: Any, j: Any) -> Sequence[Primitive]:
+    def primitives(self, i, j):
         point, axes = vec(self.point), triad(self.axis)
         return (OnTorus(axes, i.arm(point), j.arm(point), self.major, self.minor),)

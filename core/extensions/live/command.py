@@ -87,7 +87,7 @@ class Serve(Command):
         Raises:
             KincheckError: the file cannot be read, or a library is missing.
         """
-        return self._server(registry, self._reader(registry), framed=True)
+        return self._server(registry, self._reader(registry, named=False), framed=True)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
@@ -141,7 +141,7 @@ class Serve(Command):
     def _file(self) -> Path:
         return Path(self.case if isinstance(self.case, str | Path) else self.case.name)
 
-    def _reader(self, registry: Registry, *, named: bool = False) -> Callable[[], Live]:
+    def _reader(self, registry: Registry, *, named: bool) -> Callable[[], Live]:
         """Return the function that opens a table of hardpoints, or any other mechanism.
 
         Args:

@@ -41,6 +41,7 @@ from ...support.block_structures import (
 from ...support.mechanisms import (
     LEAN,
     ORIGIN,
+    Y,
     Z,
     chain,
     chain_end,
@@ -102,7 +103,7 @@ def test_equal_driven_components_share_program():
         "cranks",
         [Body(f"body {name}") for name in names],
         [
-            Revolute(name, "ground", f"body {name}", (k, 0.0, 0.0), (0.0, 1.0, 0.0))
+            Revolute(name, "ground", f"body {name}", (k, 0.0, 0.0), Y)
             for k, name in enumerate(names, 1)
         ],
         [Point(f"tip {name}", f"body {name}", (k, 0.0, 1.0)) for k, name in enumerate(names, 1)],

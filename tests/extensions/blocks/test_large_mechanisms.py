@@ -119,10 +119,7 @@ def test_sparse_rates_after_row_exchange():
     point = found.points["meet"]
     assert np.abs(point.position - meet).max() < 1e-13
     # the rod and the rocker keep their lengths, to the second derivative
-    for end, rate, second in (
-        (pin, np.cross((0.0, 0.0, 1.0), pin), -pin),
-        (np.array([1.2, 0.0, 0.0]), 0.0, 0.0),
-    ):
+    for end, rate, second in ((pin, np.cross(Z, pin), -pin), (np.array([1.2, 0.0, 0.0]), 0.0, 0.0)):
         d, v, a = point.position - end, point.velocity - rate, point.acceleration - second
         assert np.abs((d * v).sum(axis=1)).max() < 1e-12
         assert np.abs((v * v).sum(axis=1) + (d * a).sum(axis=1)).max() < 1e-10
@@ -286,10 +283,10 @@ def stretched(crank, rod, angle):
         "stretched",
         bodies=[Body(name) for name in ("crank", "rod", "slider", *wheels)],
         joints=[
-            Revolute("turn", "ground", "crank", (0.0, 0.0, 0.0), Z),
+            Revolute("turn", "ground", "crank", ORIGIN, Z),
             Universal("pin", "crank", "rod", pin, (Z, (pin[1], begin - pin[0], 0.0))),
             Spherical("end", "rod", "slider", (begin, 0.0, 0.0)),
-            Translational("guide", "ground", "slider", (begin, 0.0, 0.0), (1.0, 0.0, 0.0)),
+            Translational("guide", "ground", "slider", (begin, 0.0, 0.0), X),
             *(
                 Revolute(f"axle {name}", "ground", name, (0.01 * k, 0.2, 0.0), Z)
                 for k, name in enumerate(wheels)

@@ -31,7 +31,7 @@ from scipy.sparse import linalg
 
 from ...support.block_structures import assert_alike, solve_as, solve_sparse, with_one_program
 from ...support.loaded_slider_crank import loaded
-from ...support.mechanisms import Z, crank_tip, errors, four_bar, gears, mcpherson
+from ...support.mechanisms import ORIGIN, Z, crank_tip, errors, four_bar, gears, mcpherson
 
 
 def turning(*values, rate=1.0):
@@ -61,7 +61,7 @@ def test_sparse_start_beyond_travel():
 CRANK = Mechanism(
     "crank",
     [Body("b")],
-    [Revolute("axle", "ground", "b", (0.0, 0.0, 0.0), Z)],
+    [Revolute("axle", "ground", "b", ORIGIN, Z)],
     (),
     [JointAngle("turn", "axle")],
 )

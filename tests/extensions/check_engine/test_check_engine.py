@@ -10,6 +10,7 @@ import kincheck.adapters
 import kincheck.cases
 import numpy as np
 import pytest
+from kincheck import Gear, Planar, Screw, Universal
 from kincheck.core.case.joint_probe import probe
 from kincheck.core.cli import class_loading, main
 from kincheck.core.extensions.check_engine import check as checking
@@ -17,7 +18,6 @@ from kincheck.core.extensions.check_engine import engine_cases as force_cases
 from kincheck.core.extensions.check_engine.check import rates
 from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.run import run
-from kincheck.core.joints import Gear, Planar, Screw, Universal
 from kincheck.core.studies.checks.findings import Verdict
 
 from ...support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped

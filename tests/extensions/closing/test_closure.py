@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from kincheck import Supplied, solve
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
-from kincheck.core.kinematics import degrees_of_freedom, solve
+from kincheck.core.kinematics import degrees_of_freedom
 from scipy.spatial.transform import Rotation
 
 from ...support.case_texts import complains

@@ -8,13 +8,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-from kincheck import adapters
+from kincheck import CaseError, adapters, solve
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.quantity import with_markers
-from kincheck.core.errors import CaseError
 from kincheck.core.forces import Multipliers
 from kincheck.core.harness.run import run
-from kincheck.core.kinematics import NativeSolver, solve
+from kincheck.core.kinematics import NativeSolver
 from kincheck.core.report.terminal import console
 
 from ...oracles import naive

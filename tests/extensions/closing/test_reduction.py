@@ -2,15 +2,15 @@
 
 from dataclasses import replace
 
-from kincheck.core import Body, Gear, Revolute
+from kincheck import Body, Gear, Revolute
 from kincheck.core.extensions.closing.reduction import reduce_rows
 
-from ...support.mechanisms import planar_four_bar
+from ...support.mechanisms import Y, planar_four_bar
 
 
 def test_redundancy_beside_many_branches():
     """A four-bar with a tilted hinge, among a thousand wheels that follow its crank."""
-    bars = planar_four_bar((0.0, 1.0, 0.0), (3.0, 2.0, 0.0), (3.0, 0.0, 0.0))
+    bars = planar_four_bar(Y, (3.0, 2.0, 0.0), (3.0, 0.0, 0.0))
     joints = [
         each.changed(axis=(1e-6, 0.0, 1.0)) if each.name == "pin" else each for each in bars.joints
     ]

@@ -12,9 +12,9 @@ from collections import Counter
 from importlib.util import find_spec
 
 import pytest
+from kincheck import Outcome
 from kincheck.core.extensions.cluster import distributed as ours
 from kincheck.core.extensions.cluster.distributed import ClusterError, on_cluster
-from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
 from kincheck.core.harness.workers.serve import pack

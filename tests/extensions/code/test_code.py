@@ -11,8 +11,7 @@ from pathlib import Path
 import kincheck
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import KincheckError
+from kincheck import KincheckError, cases
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.code import c, fmu, js
 from scipy.interpolate import CubicSpline

@@ -5,8 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from kincheck.cases import load
-from kincheck.core import (
+from kincheck import (
     Body,
     JointAngle,
     Mechanism,
@@ -18,21 +17,25 @@ from kincheck.core import (
     solve,
     solve_designs,
 )
+from kincheck.cases import load
 from kincheck.core.extensions.designs import design_batch
 from kincheck.core.extensions.designs.design_batch import solve_variants
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.extensions.sweep.curves import curves
+from kincheck.core.kinematics import placed, places
 from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled.compiled_model import compile_model, recent_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.formulation.parameters import placed, places
 from kincheck.core.mechanism.motions import Path
 from kincheck.core.program import NODES
 
 from ...support.mechanisms import (
     BRANCH,
+    ORIGIN,
+    X,
+    Z,
     chain,
     circles_meet,
     four_bar,
@@ -109,13 +112,9 @@ def test_designs_refuse_nearly_singular_samples():
 
 def test_designs_vary_screw_lead():
     """In the rows it is a weight, which is known only when the programs run."""
-    thread = Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), lead=0.01)
+    thread = Screw("thread", "ground", "nut", ORIGIN, Z, lead=0.01)
     mechanism = Mechanism(
-        "nut",
-        [Body("nut")],
-        [thread],
-        [Point("rim", "nut", (1.0, 0.0, 0.0))],
-        [JointAngle("turn", "thread")],
+        "nut", [Body("nut")], [thread], [Point("rim", "nut", X)], [JointAngle("turn", "thread")]
     )
     # the last larger than all else there is
     turns, leads = np.array([0.0, 1.0, 2.0]), [0.01, 0.011, 50.0]

@@ -76,9 +76,7 @@ def test_doctor_names_missing_engine_remedy(without_imports, monkeypatch, capsys
 def test_doctor_names_version_too_old(version, sound, without_imports, monkeypatch, capsys):
     known = importlib.metadata.version
     monkeypatch.setattr(
-        importlib.metadata,
-        "version",
-        lambda name: version if name == "mujoco" else known(name),
+        importlib.metadata, "version", lambda name: version if name == "mujoco" else known(name)
     )
     assert main(["doctor"]) == 0
     said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("mujoco:")]

@@ -5,15 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters
+from kincheck import GROUND, Body, Mechanism, Point, Revolute, Translational, adapters
 from kincheck.core.case.case import Balance
 from kincheck.core.case.measures import ElementForce
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.execution import Pair, attempt
-from kincheck.core.joints import Revolute, Translational
-from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
-from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 

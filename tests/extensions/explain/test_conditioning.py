@@ -1,9 +1,9 @@
 """Conditioning of a motion, at and beside poses whose rows depend on each other."""
 
 import numpy as np
-from kincheck import cases
+from kincheck import Ramp, cases
 from kincheck.core.extensions.explain.conditioning import conditioning
-from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.mechanism.motions import Path
 
 from ...support.mechanisms import BRANCH, chain
 

@@ -10,14 +10,14 @@ import kincheck.adapters
 import kincheck.core
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.adapters import engine
-from kincheck.core import (
+from kincheck import (
     Body,
+    Case,
     Distance,
     JointAngle,
     Mechanism,
     OrientationLock,
+    Outcome,
     Point,
     PointCoordinate,
     Revolute,
@@ -25,9 +25,11 @@ from kincheck.core import (
     Spherical,
     Spline,
     Translational,
+    cases,
     solve,
 )
-from kincheck.core.case.case import Case, Output, Sweep, Truth, without_forces
+from kincheck.adapters import engine
+from kincheck.core.case.case import Output, Sweep, Truth, without_forces
 from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.measures import DriverEffort
 from kincheck.core.case.models.files import load
@@ -38,7 +40,6 @@ from kincheck.core.extensions.explain.diagnose import determinacy, diagnose
 from kincheck.core.extensions.explain.rank import Ranks, free_motions
 from kincheck.core.extensions.explain.text import _directions, _forces
 from kincheck.core.harness.native_engine import explain
-from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Kind
@@ -47,7 +48,7 @@ from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.report.terminal import console
 
 from ...support.fakes import swept
-from ...support.mechanisms import four_bar, mcpherson, slider_crank
+from ...support.mechanisms import ORIGIN, four_bar, mcpherson, slider_crank
 
 
 def totals(lines):
@@ -96,7 +97,7 @@ def test_joints_between_fixed_bodies_are_skipped(tmp_path, capsys):
     case = swept(case, np.linspace(-0.05, 0.05, 3))
     bolts = [
         Revolute("bolt", "chassis", "rack", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-        Distance("stay", "ground", "chassis", ((0, 0, 0), (0, 0, 1))),
+        Distance("stay", "ground", "chassis", (ORIGIN, (0, 0, 1))),
     ]
     file = tmp_path / "strut.toml"
     bolted = replace(case.mechanism, joints=[*bolts, *case.mechanism.joints])
@@ -186,13 +187,11 @@ def test_contradiction_of_long_rods_by_length():
     off by 1 mm.
     """
     rods = [
-        Distance(name, "ground", "slider", ((x, 0.0, 0.0), (0.0, 0.0, 0.0)), 1.001)
+        Distance(name, "ground", "slider", ((x, 0.0, 0.0), ORIGIN), 1.001)
         for name, x in (("left", -1.0), ("right", 1.0))
     ]
     pushed = Mechanism(
-        "pushed",
-        [Body("slider")],
-        [Translational("guide", "ground", "slider", (0.0, 0.0, 0.0), X), *rods],
+        "pushed", [Body("slider")], [Translational("guide", "ground", "slider", ORIGIN, X), *rods]
     )
     found = Ranks(pushed).contradictions
     assert {each.row.owner for each in found} == {"left", "right"}
@@ -214,8 +213,8 @@ def test_free_motion_is_described_by_body():
         "rod",
         [Body("a"), Body("rod"), Body("b")],
         [
-            Revolute("p", "ground", "a", (0.0, 0.0, 0.0), Z),
-            Spherical("s", "a", "rod", (1.0, 0.0, 0.0)),
+            Revolute("p", "ground", "a", ORIGIN, Z),
+            Spherical("s", "a", "rod", X),
             Spherical("t", "rod", "b", (1.0, 2.0, 0.0)),
             Revolute("q", "ground", "b", (3.0, 0.0, 0.0), (0.0, 1.0, 1.0)),
         ],
@@ -289,11 +288,7 @@ def test_conditioning_names_worst_sample_and_motion():
     rows allow.
     """
     loaded = cases.load("mcpherson_strut")
-    found = diagnose(
-        swept(loaded, np.linspace(0.0, 0.293, 30)),
-        samples=30,
-        tol=1e-12,
-    )
+    found = diagnose(swept(loaded, np.linspace(0.0, 0.293, 30)), samples=30, tol=1e-12)
     assert found.worst is found.samples[-1]
     assert found.worst.smallest < 0.2 * found.samples[0].smallest
     assert found.worst.condition == pytest.approx(found.worst.largest / found.worst.smallest)
@@ -309,9 +304,9 @@ def test_blocked_shift_weights_turns_by_length(length):
     arm = Mechanism(
         "arm",
         [Body("arm")],
-        [Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+        [Revolute("hinge", "ground", "arm", ORIGIN, Z)],
         [Point("tip", "arm", (length, 0.0, 0.0))],
-        [PointCoordinate("z", "tip", (0.0, 0.0, 1.0))],
+        [PointCoordinate("z", "tip", Z)],
     )
     (blocked,) = Ranks(arm).blocked
     # the least motion: v + w L = 1, weighted by the frame's unit u of length, is w u = L/u / (1 +
@@ -330,7 +325,7 @@ def test_direction_kind_ignores_joint_name():
     assert [place for place, kind in kinds(arm).items() if kind is Kind.DIRECTION] == [
         "joints.rear.axis.axis"
     ]
-    output = Output("y", "tip", (0.0, 1.0, 0.0), False, 1e-9, 0.0, "test")
+    output = Output("y", "tip", Y, False, 1e-9, 0.0, "test")
     case = Case("arm", "test", Truth.CONSENSUS_ONLY, arm, Sweep("turn", np.array([0.5])), (output,))
     found = {
         each.number: (each.unit, each.by_sample[0])
@@ -359,12 +354,12 @@ def test_unreached_motion_lacks_spring_torque():
 @pytest.mark.usefixtures("in_folder", "own_joint_types")
 def test_joint_by_residual_is_explained():
     """A marble in a bowl: z = x^2 / (2 R), so z' = x / R, z'' = 1 / R, and dz / dR = -z / R."""
-    bowl = load_joint("bowl:Bowl")("bowl", "ground", "marble", (0.0, 0.0, 0.0), Z, 0.4)
+    bowl = load_joint("bowl:Bowl")("bowl", "ground", "marble", ORIGIN, Z, 0.4)
     marble = Mechanism(
         "marble",
         [Body("marble")],
         [bowl, OrientationLock("upright", "ground", "marble")],
-        [Point("centre", "marble", (0.0, 0.0, 0.0))],
+        [Point("centre", "marble", ORIGIN)],
         [PointCoordinate("along", "centre", X), PointCoordinate("across", "centre", Y)],
     )
     x = np.linspace(-0.2, 0.2, 5)

@@ -5,16 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import (
-    Point,
-)
+from kincheck import Point, cases
 from kincheck.core.extensions.designs.prepared import prepare_designs
 from kincheck.core.extensions.explain.diagnose import diagnose
 from kincheck.core.kinematics import NativeSolver, places
 
 from ...support.fakes import swept
-from ...support.mechanisms import four_bar, mcpherson
+from ...support.mechanisms import ORIGIN, four_bar, mcpherson
 from .test_explain import case
 
 
@@ -26,10 +23,7 @@ def test_sensitivities_equal_central_differences(name, value):
     round-off, 1e-15 / 1e-5. Positions at one point are one hardpoint, named by the first.
     """
     loaded = cases.load(name)
-    case, mechanism = (
-        swept(loaded, [value]),
-        loaded.mechanism,
-    )
+    case, mechanism = (swept(loaded, [value]), loaded.mechanism)
     numbers = [
         (place, k, x) for place, design in places(mechanism).items() for k, x in enumerate(design)
     ]
@@ -100,9 +94,7 @@ def test_binding_axis_is_flagged():
 
 
 def test_fixed_point_depends_on_itself():
-    mechanism = replace(
-        mcpherson(), points=[*mcpherson().points, Point("bolt", "chassis", (0.0, 0.0, 0.0))]
-    )
+    mechanism = replace(mcpherson(), points=[*mcpherson().points, Point("bolt", "chassis", ORIGIN)])
     found = diagnose(case(mechanism, [0.01], "bolt"), samples=1, tol=1e-12)
     assert {each.number for each in found.sensitivities} == {
         f"points.bolt.position {axis}" for axis in "xyz"

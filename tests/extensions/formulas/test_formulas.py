@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kincheck.core import MechanismError
+from kincheck import MechanismError
 from kincheck.core.extensions.formulas.motion import Formula
 
 T = np.linspace(0.11, 1.87, 13)
@@ -13,11 +13,7 @@ W = np.clip(PART, 0.0, 1.0)
 FORMULAS = {
     "SIN(2*TIME)**2": (S**2, 4 * S * C, 8 * (C**2 - S**2)),
     "-2**2 + 3*TIME**2/6": (-4 + T**2 / 2, T, 1.0 + 0 * T),
-    "(1+TIME)*COS(2*time)": (
-        (1 + T) * C,
-        C - 2 * (1 + T) * S,
-        -4 * S - 4 * (1 + T) * C,
-    ),
+    "(1+TIME)*COS(2*time)": ((1 + T) * C, C - 2 * (1 + T) * S, -4 * S - 4 * (1 + T) * C),
     "1/(1+TIME)": (1 / (1 + T), -1 / (1 + T) ** 2, 2 / (1 + T) ** 3),
     "SQRT(4*TIME)": (2 * T**0.5, T**-0.5, -0.5 * T**-1.5),
     "SHF(TIME, 0.1, 3, 2, 30D, 1)": (
@@ -25,11 +21,7 @@ FORMULAS = {
         6 * np.cos(2 * (T - 0.1) - np.pi / 6),
         -12 * np.sin(2 * (T - 0.1) - np.pi / 6),
     ),
-    "POLY(TIME, 1, 1D0, 2, -3)": (
-        1 + 2 * (T - 1) - 3 * (T - 1) ** 2,
-        2 - 6 * (T - 1),
-        -6 + 0 * T,
-    ),
+    "POLY(TIME, 1, 1D0, 2, -3)": (1 + 2 * (T - 1) - 3 * (T - 1) ** 2, 2 - 6 * (T - 1), -6 + 0 * T),
     "STEP(TIME, 0.5, 1, 1.3, 3)": (
         1 + 2 * W * W * (3 - 2 * W),
         2 * 6 * W * (1 - W) / 0.8,

@@ -8,14 +8,25 @@ from dataclasses import replace
 import kincheck
 import numpy as np
 import pytest
-from kincheck import CaseError, KincheckError, Mechanism, SolveError
-from kincheck.core import Body, JointAngle, Point, PointCoordinate, Revolute, Translational
+from kincheck import (
+    Body,
+    CaseError,
+    JointAngle,
+    KincheckError,
+    Mechanism,
+    Point,
+    PointCoordinate,
+    Revolute,
+    SolveError,
+    Translational,
+)
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.free.free_dynamics import free_motion
 from kincheck.core.mechanism.loads import SpringDamper, Torque, TorsionSpringDamper
 from scipy.special import ellipj, ellipk
 
 from ...support.examples import examples
+from ...support.mechanisms import ORIGIN, X, Y, Z
 
 (CASE,) = examples(__file__, "case")
 
@@ -27,7 +38,7 @@ def pendulum(length=0.7, start=1.2, **changes):
     tip = (0.0, length * math.sin(start), -length * math.cos(start))
     given = {
         "bodies": [Body("rod", mass=2.0, center_of_mass=tip)],
-        "joints": [Revolute("hinge", "ground", "rod", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))],
+        "joints": [Revolute("hinge", "ground", "rod", ORIGIN, X)],
         "points": [Point("tip", "rod", tip)],
         "drivers": [JointAngle("turn", "hinge")],
         "gravity": (0.0, 0.0, -G),
@@ -84,10 +95,10 @@ def test_free_body_turns_by_jacobi_functions():
     # Landau & Lifshitz, Mechanics, section 37: M^2 > 2 E I2, started where w2 = 0
     I1, I2, I3 = 0.3, 0.5, 0.7
     w1, w3 = 0.4, 2.0
-    body = Body("top", mass=1.0, center_of_mass=(0.0, 0.0, 0.0), inertia=(I1, I2, I3, 0, 0, 0))
-    tips = {"c": (0.0, 0.0, 0.0), "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
-    ways = [("c", (1, 0, 0)), ("c", (0, 1, 0)), ("c", (0, 0, 1))]
-    ways += [("x", (0, 1, 0)), ("x", (0, 0, 1)), ("y", (0, 0, 1))]
+    body = Body("top", mass=1.0, center_of_mass=ORIGIN, inertia=(I1, I2, I3, 0, 0, 0))
+    tips = {"c": ORIGIN, "x": X, "y": Y}
+    ways = [("c", X), ("c", Y), ("c", Z)]
+    ways += [("x", Y), ("x", Z), ("y", Z)]
     drivers = [PointCoordinate(f"d{k}", *each) for k, each in enumerate(ways)]
     top = Mechanism("top", [body], [], [Point(k, "top", x) for k, x in tips.items()])
     top = replace(top, drivers=drivers)
@@ -108,12 +119,12 @@ def test_free_body_turns_by_jacobi_functions():
 
 def slider(mass=2.0, **load):
     """A block on a slide along x, on a spring with a damper; also its closed form."""
-    spring = SpringDamper("s", "ground", "block", ((-2.0, 0, 0), (0.0, 0, 0)), **load)
+    spring = SpringDamper("s", "ground", "block", ((-2.0, 0, 0), ORIGIN), **load)
     return Mechanism(
         "slider",
-        [Body("block", mass=mass, center_of_mass=(0.0, 0.0, 0.0))],
-        [Translational("slide", "ground", "block", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))],
-        points=[Point("p", "block", (0.0, 0.0, 0.0))],
+        [Body("block", mass=mass, center_of_mass=ORIGIN)],
+        [Translational("slide", "ground", "block", ORIGIN, X)],
+        points=[Point("p", "block", ORIGIN)],
         forces=[spring],
     )
 
@@ -144,7 +155,7 @@ def test_damped_block_follows_its_closed_form(k, c, end, method):
 @pytest.mark.nightly
 def test_torsional_spring_swings_beyond_turns():
     spring = TorsionSpringDamper("s", "hinge", stiffness=3.0, free_angle=10.0)
-    body = Body("rod", mass=1.0, center_of_mass=(0.0, 0.0, 0.0), inertia=(0.2, 0.3, 0.4, 0, 0, 0))
+    body = Body("rod", mass=1.0, center_of_mass=ORIGIN, inertia=(0.2, 0.3, 0.4, 0, 0, 0))
     wheel = pendulum(bodies=[body], forces=[spring])
     found = free_motion(wheel, np.linspace(0.0, 2.0, 3))
     angle = 10.0 * (1.0 - np.cos(math.sqrt(3.0 / 0.2) * found.times))
@@ -173,10 +184,10 @@ def test_andrews_squeezer_free_reaches_published_angles():
 
 def test_free_parallelogram_ends_at_change_point():
     joints = [
-        Revolute(name, *bodies, point, (0.0, 0.0, 1.0))
+        Revolute(name, *bodies, point, Z)
         for name, bodies, point in (
-            ("A", ("ground", "crank"), (0.0, 0.0, 0.0)),
-            ("B", ("crank", "rod"), (0.0, 1.0, 0.0)),
+            ("A", ("ground", "crank"), ORIGIN),
+            ("B", ("crank", "rod"), Y),
             ("C", ("rod", "rocker"), (2.0, 1.0, 0.0)),
             ("D", ("ground", "rocker"), (2.0, 0.0, 0.0)),
         )
@@ -203,10 +214,7 @@ def test_free_parallelogram_ends_at_change_point():
         ({}, {"hing": 1.0}, "hinge"),
         ({}, {"hinge": 1.0, "turn": 2.0}, "contradict"),
         (
-            {
-                "bodies": [Body("rod", mass=1.0)],
-                "forces": [Torque("t", "rod", vector=(1.0, 0.0, 0.0))],
-            },
+            {"bodies": [Body("rod", mass=1.0)], "forces": [Torque("t", "rod", vector=X)]},
             {},
             "no inertia",
         ),

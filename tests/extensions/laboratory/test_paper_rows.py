@@ -7,7 +7,7 @@ that is what keeps Newton off the spurious zeros (formulation section 3).
 import numpy as np
 import pytest
 from kincheck import Body, Mechanism, OrientationLock, SolveError
-from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, turned_by
+from kincheck.core.algebra import ZERO, Vec3, X, Y, Z, turned_by
 from kincheck.core.extensions.laboratory.paper.rows import (
     LockTest,
     PaperDot11,
@@ -23,6 +23,7 @@ from kincheck.core.primitives import GROUND_POSE, Dot11, Dot12, NamedTurn, Pose
 
 from ...support.specimens import (
     LANES,
+    SPURIOUS,
     direction,
     frame,
     in_body_axes,
@@ -133,8 +134,6 @@ def test_simplified_line_rows_need_lock(rng):
 
 # The branch that Newton reaches
 
-STARTS = 1500
-
 
 def lock(style):
     """The primitives of an orientation lock between two moving bodies."""
@@ -143,29 +142,19 @@ def lock(style):
     return [each.primitive for each in found.constraints]
 
 
-def uniform(rng):
-    e = rng.normal(size=(4, STARTS))
-    e /= np.sqrt((e * e).sum(axis=0))
-    return Quat(e[0], Vec3(*e[1:]))
-
-
-def stacked(values):
-    return np.array([np.broadcast_to(value, STARTS) for value in values])
-
-
 def newton(primitives, i, j):
     """Plain Newton with the smallest steps: (whether a zero was reached, the angle left between the
     bodies [rad]).
     """
-    done = np.zeros(STARTS, dtype=bool)
+    done = np.zeros(LANES, dtype=bool)
     for _ in range(60):
         poses = Pose.of(ZERO, i), Pose.of(ZERO, j)
-        phi = stacked([value for each in primitives for value in each.phi(*poses)])
+        phi = lanes([value for each in primitives for value in each.phi(*poses)])
         done = np.abs(phi).max(axis=0) < 1e-12
         if done.all():
             break
         rows = np.array(
-            [stacked([*row.pi, *row.pj]) for each in primitives for row in each.rows(*poses)]
+            [lanes([*row.pi, *row.pj]) for each in primitives for row in each.rows(*poses)]
         ).transpose(2, 0, 1)
         step = -np.einsum("lij,jl->il", np.linalg.pinv(rows), phi) * ~done
         turns = [Vec3(*part) for part in (step[:3], step[3:])]
@@ -180,22 +169,16 @@ def test_newton_branch_from_random_starts(style, rng):
     """Exact rows lead to the nearest zero; seven of the eight rotations that solve the conventional
     residual are spurious.
     """
-    done, left = newton(lock(style), uniform(rng), uniform(rng))
+    done, left = newton(lock(style), orientation(rng), orientation(rng))
     assert done.all()
     right = int((left < 1e-6).sum())
     if style == "conventional":
         # 12 percent in formulation section 3; the others end at turns of 120 and 180 degrees
-        assert 0.05 < right / STARTS < 0.3
+        assert 0.05 < right / LANES < 0.3
         turns = np.degrees(left[left > 1e-6])
         assert (np.minimum(np.abs(turns - 120.0), np.abs(turns - 180.0)) < 1e-3).all()
     else:
-        assert right == STARTS
-
-
-SPURIOUS = [rotation(axis, np.pi) for axis in (X, Y, Z)] + [
-    rotation((1.0 / np.sqrt(3.0)) * Vec3(a, b, c), 2.0 * np.pi / 3.0)
-    for a, b, c in ((1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))
-]
+        assert right == LANES
 
 
 @pytest.mark.parametrize("style", [PaperDot12(), LockTest(Y, Z)], ids=["paper", "lock"])

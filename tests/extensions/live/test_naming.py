@@ -2,7 +2,9 @@
 
 import json
 
+import kincheck
 import pytest
+from kincheck import KincheckError
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import registry
@@ -48,6 +50,11 @@ def test_page_proposes_roles_and_saves(server, tmp_path, capsys):
     assert "car_names.toml is written. Next time, add: " in capsys.readouterr().err
     said = Supplied("double_wishbone", "mm", "iso", names=names)
     assert places(load(tmp_path / "car.csv", said)) == places(plain(tmp_path, RACE))
+
+
+def test_python_asks_for_names(tmp_path):
+    with pytest.raises(KincheckError, match="leaves open what options state"):
+        kincheck.live(write(tmp_path, TEXT, "car.csv"))
 
 
 @pytest.mark.parametrize(

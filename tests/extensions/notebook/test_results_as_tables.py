@@ -14,15 +14,17 @@ from kincheck.core.extensions.notebook.tables import columns_of, table_of
 from kincheck.core.harness.scene_record import Scene, SceneBody, SceneJoint, ScenePoint
 from kincheck.core.tabular import Tabular
 
+from ...support.mechanisms import ORIGIN, X, Z
+
 
 def rssr():
     return kincheck.Mechanism(
         "rssr",
         [kincheck.Body("crank"), kincheck.Body("rocker")],
         [
-            kincheck.Revolute("input", "ground", "crank", point=(0, 0, 0), axis=(0, 0, 1)),
-            kincheck.Revolute("output", "ground", "rocker", point=(2, 1, 3), axis=(1, 0, 0)),
-            kincheck.Distance("rod", "crank", "rocker", points=((1, 0, 0), (2, 4.9, 2.2))),
+            kincheck.Revolute("input", "ground", "crank", point=ORIGIN, axis=Z),
+            kincheck.Revolute("output", "ground", "rocker", point=(2, 1, 3), axis=X),
+            kincheck.Distance("rod", "crank", "rocker", points=(X, (2, 4.9, 2.2))),
         ],
         [kincheck.Point("end", "rocker", (2, 4.9, 2.2))],
         [kincheck.JointAngle("turn", "input")],
@@ -168,8 +170,8 @@ def test_trajectory_has_all_drivers():
         "arm",
         [kincheck.Body("upper"), kincheck.Body("lower")],
         [
-            kincheck.Revolute("shoulder", "ground", "upper", (0, 0, 0), (0, 0, 1)),
-            kincheck.Translational("slide", "upper", "lower", (1, 0, 0), (1, 0, 0)),
+            kincheck.Revolute("shoulder", "ground", "upper", ORIGIN, Z),
+            kincheck.Translational("slide", "upper", "lower", X, X),
         ],
         [kincheck.Point("hand", "lower", (2, 0, 0))],
         [kincheck.JointAngle("turn", "shoulder"), kincheck.JointDisplacement("reach", "slide")],

@@ -43,7 +43,7 @@ from kincheck.core.mechanism.motions import Path as Way
 from kincheck.core.program import Tape, absolute, cos, program, sin, where_larger
 from kincheck.core.program.tape import jacobian
 
-from ...support.mechanisms import CRANK, ORIGIN, ROD, Z, four_bar, slider_crank
+from ...support.mechanisms import CRANK, ORIGIN, ROD, X, Y, Z, four_bar, slider_crank
 
 flint = pytest.importorskip("flint")
 BITS = 200
@@ -193,8 +193,8 @@ def test_enclosure_refuses_overturned_branch():
         "arm",
         [Body("arm")],
         [Revolute("pivot", "ground", "arm", ORIGIN, Z)],
-        [Point("tip", "arm", (1.0, 0.0, 0.0)), Point("end", "arm", Z)],
-        [PointCoordinate("lift", "tip", (0.0, 1.0, 0.0))],
+        [Point("tip", "arm", X), Point("end", "arm", Z)],
+        [PointCoordinate("lift", "tip", Y)],
     )
     traced, pose, drives = _setup(arm, arm, 0.1)
     s, c = math.sin(0.5 * math.asin(0.1)), math.cos(0.5 * math.asin(0.1))
@@ -215,7 +215,7 @@ def test_enclosure_refuses_change_point():
         [Body("a"), Body("b"), Body("c")],
         [
             Revolute("A", "ground", "a", ORIGIN, y),
-            Revolute("B", "a", "b", (0.0, 1.0, 0.0), y),
+            Revolute("B", "a", "b", Y, y),
             Revolute("C", "b", "c", (2.0, 1.0, 0.0), y),
             Revolute("D", "ground", "c", (2.0, 0.0, 0.0), y),
         ],

@@ -11,9 +11,9 @@ from codecs import BOM_UTF8
 
 import kincheck.core
 import pytest
+from kincheck import Outcome, Record
 from kincheck.adapters import ENGINES
 from kincheck.core.extensions.pytest_plugin import plugin as pytest_plugin
-from kincheck.core.harness.record import Outcome, Record
 
 from ...support.case_texts import BASE, INLINE, edited
 

@@ -5,7 +5,7 @@ import json
 
 import kincheck
 import pytest
-from kincheck.core.case.io.reader_options import Supplied
+from kincheck import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.compare import designs
@@ -90,9 +90,7 @@ def test_kc_reaches_every_form(tmp_path):
     assert unexplained(lacking, OF_KC) == ([], [])
 
 
-OF_COMPARE = [
-    (r"exceeded|other\..*", "csv", "words"),
-]
+OF_COMPARE = [(r"exceeded|other\..*", "csv", "words")]
 
 
 def test_compare_reaches_every_form(tmp_path):

@@ -28,7 +28,7 @@ from kincheck import (
 
 from ...oracles import naive
 from ...support.adams_single_joints import CASES, NAMES, axes, right
-from ...support.mechanisms import four_bar
+from ...support.mechanisms import X, Y, four_bar
 
 # The data have six significant digits, trailing zeros left out.
 DIGITS = 6
@@ -96,8 +96,8 @@ def wrong_joints(case):
         if case["joint"] == "distance":
             yield "a millimetre longer", Distance(*NAMES, ends, case["length"] + 1e-3)
         else:
-            yield "along x", RevoluteSpherical(*NAMES, ends, (1.0, 0.0, 0.0))
-            yield "along y", RevoluteSpherical(*NAMES, ends, (0.0, 1.0, 0.0))
+            yield "along x", RevoluteSpherical(*NAMES, ends, X)
+            yield "along y", RevoluteSpherical(*NAMES, ends, Y)
         return
     at, (x, y, z) = case["point"], axes(case)
     if case["joint"] in ("revolute", "translational", "cylindrical"):
@@ -218,7 +218,7 @@ CURVE = Polynomial("gear", ("hinge two", "hinge one"), (0.0, 0.5, 0.03))
 
 
 def geared(coupler):
-    bodies = [Body("one"), Body("two", origin=(1.0, 0.0, 0.0))]
+    bodies = [Body("one"), Body("two", origin=X)]
     hinges = [
         Revolute(f"hinge {b.name}", "ground", b.name, b.origin, (0.0, 0.1, 1.0)) for b in bodies
     ]

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
-from kincheck.core import JointAngle, Revolute, Spherical
+from kincheck import JointAngle, Revolute, Spherical, adapters, cases
+from kincheck.adapters.shared.axis_angles import euler_angles
+from kincheck.adapters.simbody.simbody import turn_parameters
 from kincheck.core.case.case import Sweep
 from kincheck.core.doors import offers
 
@@ -16,8 +17,6 @@ from ...support.mechanisms import ORIGIN, Y
 
 pytest.importorskip("opensim", reason="OpenSim is not installed: pip install 'kincheck[simbody]'")
 
-from kincheck.adapters.shared.axis_angles import euler_angles
-from kincheck.adapters.simbody.simbody import turn_parameters
 
 ENGINE = adapters.engine("simbody")
 

@@ -5,24 +5,26 @@ from functools import cache
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
-from kincheck.adapters.simulate.simulation import with_joints_alone
-from kincheck.core import (
+from kincheck import (
     Distance,
     Gear,
     JointAngle,
     JointDisplacement,
+    Outcome,
     PointCoordinate,
     Revolute,
+    Sine,
     Translational,
+    adapters,
+    cases,
     solve,
 )
+from kincheck.adapters.simulate.simulation import with_joints_alone
 from kincheck.core.case.case import Series, Sweep, Truth
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.cli import main
-from kincheck.core.harness.record import Outcome, from_json
+from kincheck.core.harness.record import from_json
 from kincheck.core.harness.run import run
-from kincheck.core.mechanism.motions import Sine
 
 from ...support.engine_motion import installed, mechanism_of, motion_case
 from ...support.examples import examples
@@ -123,7 +125,7 @@ def test_simulation_out_of_reach_ends(name):
 
 
 FOLLOWING = [
-    *("mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-static", "drake", "dart"),
+    *("mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-static", "drake", "dart")
 ]
 
 
@@ -203,7 +205,7 @@ def test_pinocchio_subtrees_have_no_gap():
         assert joint == 0 or [*subtree] == [*range(joint, joint + len(subtree))]
 
 
-@pytest.mark.parametrize("along", [(1.0, 0.0, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0)])
+@pytest.mark.parametrize("along", [X, (0.6, 0.8, 0.0), Z])
 def test_jointed_rod_turns_all_round(along):
     """Its cross hinges about the crank's axis, since any other lies along the rod once a turn; but
     about another where the rod lies along that axis.

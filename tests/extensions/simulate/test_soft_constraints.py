@@ -1,16 +1,14 @@
 """MuJoCo's own constraint forces: what its tendon leaves out, and messages."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core.errors import CaseError
+from kincheck import CaseError, cases
+from kincheck.adapters.simulate.soft_constraints import main, report_lines, rod_forces
 
 pytest.importorskip("mujoco")
 
-from kincheck.adapters.simulate.soft_constraints import main, report_lines, rod_forces
 
 STRUT = cases.load("mcpherson_strut_loaded")
 
@@ -45,7 +43,7 @@ def test_soft_constraints_bad_input_is_refused():
         rod_forces(massless, "tie_rod")
 
 
-def test_soft_constraints_command_refuses_bad_arguments(tmp_path: Path, capsys):
+def test_soft_constraints_command_refuses_bad_arguments(tmp_path, capsys):
     assert main([]) == 2
     assert main([str(tmp_path / "none.toml")]) == 2
     assert "error: " in capsys.readouterr().err

@@ -5,15 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
+from kincheck import CaseError, KincheckError, Outcome, adapters, cases
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.measures import DriverEffort
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.cli.main import main
-from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.native_engine import NativeEngine
-from kincheck.core.harness.record import Outcome
 from scipy.optimize import brentq
 
 from ...support.examples import examples

@@ -10,20 +10,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core.errors import SolveError
+from kincheck import (
+    GROUND,
+    Body,
+    Cylindrical,
+    JointAngle,
+    Mechanism,
+    Point,
+    PointCoordinate,
+    Revolute,
+    SolveError,
+    Translational,
+    cases,
+)
 from kincheck.core.extensions.statics.equations import with_free_coordinates
 from kincheck.core.extensions.statics.equilibrium import StaticModel
-from kincheck.core.joints import Cylindrical, Revolute, Translational
-from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
-from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
-from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq, minimize_scalar
 
 from ...oracles.naive import tilde
-from ...support.mechanisms import ORIGIN, X, Z
+from ...support.mechanisms import ORIGIN, X, Y, Z
 
 DATA = Path(__file__).parents[2] / "data" / "elastokinematics"
 
@@ -296,7 +303,7 @@ def test_driver_holding_nothing_is_refused():
     mechanism = replace(
         ARM,
         points=[Point("tip", "arm", (0.4, 0.0, 0.0))],
-        drivers=[JointAngle("turn", "hinge"), PointCoordinate("push", "tip", (0.0, 1.0, 0.0))],
+        drivers=[JointAngle("turn", "hinge"), PointCoordinate("push", "tip", Y)],
     )
     with pytest.raises(SolveError, match="driver 'push' holds nothing"):
         StaticModel(mechanism)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
+from kincheck import Outcome, Ramp, Trajectory, adapters, cases
 from kincheck.adapters import engine
 from kincheck.core.case.case import Origin, Series, Truth
 from kincheck.core.case.io.case_file import load_case
@@ -17,13 +17,11 @@ from kincheck.core.extensions.hardpoints.suspension import camber_of_front_view
 from kincheck.core.extensions.suspects.suspects import FACTORS, slips
 from kincheck.core.harness.compare import Curve
 from kincheck.core.harness.native_engine import NativeEngine
-from kincheck.core.harness.record import Outcome, from_json, to_json
+from kincheck.core.harness.record import from_json, to_json
 from kincheck.core.harness.verdict import digest
-from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.report import headline, write_report
 from kincheck.core.report.table import messages, to_markdown
-from kincheck.core.trajectory import Trajectory
 
 from ...support.case_texts import BASE, CSV, INLINE, complains, write
 from ...support.engine_faults import changed

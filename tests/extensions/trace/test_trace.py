@@ -7,8 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core import JointAngle, SolveError
+from kincheck import JointAngle, SolveError, cases
 from kincheck.core.extensions.trace.curve import trace
 
 from ...kinematics.test_redundancy import locomotive
