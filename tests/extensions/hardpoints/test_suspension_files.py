@@ -44,7 +44,7 @@ def test_wrong_suspension_is_refused(name):
     refused(lambda: loaded(unreferenced(changed(*table, **keys))), f"case.json ... {said}")
 
 
-def test_suspension_of_no_moving_wheel_is_refused():
+def test_suspension_without_moving_wheel_refused():
     for data, said in (
         (ON_CHASSIS, "suspension.wheel_center ... a body that moves"),
         (
