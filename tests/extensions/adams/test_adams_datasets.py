@@ -361,6 +361,20 @@ def test_adams_marker_relative_to_marker(tmp_path):
     assert one.point == pytest.approx(other.point, abs=1e-14)
 
 
+def test_adams_exact_part_stays(tmp_path):
+    """Of two parts whose markers are 2 mm apart, the one with EXACT coordinates keeps them."""
+    deck = Deck(4).part(2, ", EXACT = X:Y:Z:PSI:THETA:PHI").part(3)
+    deck.marker(11, 2, AT, AXES).marker(12, 1, AT, AXES)
+    deck.marker(21, 3, AT + 2.0 * X, AXES).marker(22, 2, AT, AXES)
+    deck.marker(31, 3, AT + 90.0 * Y, AXES).marker(32, 1, AT - 90.0 * Y, AXES)
+    deck.add("JPRIM/1, INPLANE, I = 11, J = 12", "JOINT/2, FIXED, I = 21, J = 22")
+    case = read(tmp_path, deck, recorded=True)
+    one, other = case.mechanism.bodies
+    assert one.origin == pytest.approx(MM * deck.parts[2][0], abs=1e-15)
+    assert other.origin == pytest.approx(MM * (deck.parts[3][0] - 2.0 * X), abs=1e-14)
+    assert any("JOINT_2 by 0.002 m" in each for each in case.assembly)
+
+
 def test_adams_dialects_read_alike(tmp_path):
     """Abbreviations, continuations, comments, letters, separators."""
     plain = driven("30D*TIME").text

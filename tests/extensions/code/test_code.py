@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from ...support.examples import examples
 
-(LOCKS,) = examples(__file__, "locks")
+REFUSED, LOCKS = examples(__file__, "refused", "locks")
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
 CLOSE = 1e-13
@@ -330,16 +330,7 @@ def test_fmu_takes_held_drivers(version, tmp_path):
     assert_equal(np.array([found[f"{name}.velocity"] for name in names]), expected[k, :, 1])
 
 
-@pytest.mark.parametrize(
-    ("argv", "said"),
-    [
-        ("four_bar --to c --at 1", "--at: the code starts at the design position"),
-        ("four_bar --to c --fmi 3", "--fmi: only an FMU has a version"),
-        ("four_bar --to mjcf --vary a", "--vary: only code takes it"),
-        ("four_bar --to c --vary nothing", "place 'nothing'"),
-        ("four_bar --to cobol", "there is no format 'cobol'"),
-    ],
-)
+@pytest.mark.parametrize(("argv", "said"), REFUSED)
 def test_export_of_code_is_refused(argv, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["export", *argv.split()]) == 2

@@ -25,7 +25,7 @@ from ...kinematics.test_bushings import bushed
 from ...support.engine_motion import SIMULATORS, installed
 from ...support.examples import examples
 
-SERIES, WHEEL, HINGES = examples(__file__, "series", "wheel", "hinges")
+REFUSED, SERIES, WHEEL, HINGES = examples(__file__, "refused", "series", "wheel", "hinges")
 
 DATA = Path(__file__).parents[2] / "data" / "elastokinematics"
 STRUT = json.loads((DATA / "5_strut_kc.json").read_text())
@@ -230,26 +230,10 @@ def test_load_beyond_equilibrium_is_counted(tmp_path, capsys):
     assert "2 further samples without equilibrium. Give less travel or load" in said[-1]
 
 
-@pytest.mark.parametrize(
-    ("more", "options", "expected"),
-    [
-        ('[compliance]\nwheel = "hub"\n', "", "'hub'"),
-        ('[compliance]\ncontact = "nowhere"\n', "", "'nowhere'"),
-        ("[compliance]\nheld = []\n", "", "no held driver lifts the wheel"),
-        ("", "--axle roll", "needs both wheels"),
-        ("", "--load vertical=0:1:2", "'vertical' is none of"),
-        ("", "--travel=0:1", "START:STOP:SAMPLES"),
-        ("", "--travel=0:1furlong:3", "START:STOP:SAMPLES"),
-        ("", "--travel=nan:1:3", "START:STOP:SAMPLES"),
-        ("", "--travel=-30mm", "--travel=20mm:20mm:1 for one place"),
-        ("", f"--out {__file__}", "cannot be made a folder"),
-        ("", "--travel=0:3deg:3", "unless a unit (m, mm, cm, inch, foot) is given"),
-        ("", "--load lateral=0:3Nm:3", "numbers in N or kN"),
-        ("", "--load aligning=0:3N:3", "numbers in Nm or kNm"),
-    ],
-)
+@pytest.mark.parametrize(("more", "options", "expected"), REFUSED)
 def test_kc_without_facts_is_refused(tmp_path, capsys, more, options, expected):
-    assert main(["kc", strut_file(tmp_path, more), *options.split()]) == 2
+    options = options.format(file=__file__).split()
+    assert main(["kc", strut_file(tmp_path, more), *options]) == 2
     assert expected in capsys.readouterr().err
 
 

@@ -207,6 +207,28 @@ def curves_of(file, motion):
 
 
 @pytest.mark.parametrize("motion", ["heave", "roll"])
+def test_unlike_axle_follows_exchange_of_sides(motion, tmp_path):
+    """By its mirror image, the order of the file, drivers that count downwards, and other axes."""
+    given = curves_of(arm_case(tmp_path), motion)
+    turned = slice(None, None, 1 if motion == "heave" else -1)
+    image = curves_of(arm_case(tmp_path, "image", mirrored=True), motion)
+    for name in given.keys() - {"spring", "pivot", "effort"}:
+        sign = -1.0 if name.startswith("roll_angle") else 1.0
+        wanted = sign * given[exchanged(name)][turned]
+        assert image[name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), name
+    for options in (
+        {"seen_from": "right"},
+        {"down": ("left",)},
+        {"down": ("left", "right")},
+        {"odd": True},
+    ):
+        again = curves_of(arm_case(tmp_path, "again", **options), motion)
+        assert again.keys() == given.keys()
+        for name in given.keys() - {"effort"}:
+            assert again[name] == pytest.approx(given[name], rel=1e-9, abs=1e-9), (name, options)
+
+
+@pytest.mark.parametrize("motion", ["heave", "roll"])
 def test_axle_rates_equal_closed_form(motion, tmp_path):
     """An arm of 0.4 m turns by asin(z / 0.4); its torque T holds the wheel by T / (0.4 cos)."""
     from scipy.interpolate import PchipInterpolator

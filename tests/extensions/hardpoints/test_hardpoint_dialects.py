@@ -16,19 +16,10 @@ from kincheck.core.errors import CaseError
 from ...support.case_texts import complains, rows, write
 from ...support.examples import examples
 
-EDITS, FORMS, ADAMS, LOTUS = examples(__file__, "edits", "forms", "adams", "lotus")
+POINTS, EDITS, FORMS, ADAMS, LOTUS = examples(
+    __file__, "points", "edits", "forms", "adams", "lotus"
+)
 
-POINTS = {
-    "uca_front": (-89.75, -259.75, 285.25),
-    "uca_rear": (110.25, -264.75, 280.25),
-    "uca_outer": (15.25, -539.75, 312.25),
-    "lca_front": (-119.75, -209.75, 125.25),
-    "lca_rear": (130.25, -214.75, 120.25),
-    "lca_outer": (-4.75, -574.75, 118.25),
-    "tierod_inner": (-69.75, -219.75, 150.25),
-    "tierod_outer": (-74.75, -559.75, 148.25),
-    "wheel_center": (0.25, -611.75, 228.25),
-}
 SAID = Supplied("double_wishbone", "mm", "rearward,right,up")
 
 

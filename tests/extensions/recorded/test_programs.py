@@ -10,7 +10,7 @@ from kincheck.core.cli.main import main
 from ...support.crank import MECHANISM
 from ...support.examples import examples
 
-(CRANK,) = examples(__file__, "crank")
+FAILING, CRANK = examples(__file__, "failing", "crank")
 
 CASE = f"""{MECHANISM}[sweep]
 driver = "turn"
@@ -88,16 +88,7 @@ sys.exit(3)
     assert (record["outcome"], record["message"]) == ("unsupported", "crank refuses the case")
 
 
-@pytest.mark.parametrize(
-    ("program", "text"),
-    [
-        ("import os\nos.kill(os.getpid(), 11)", "ended by signal SIGSEGV"),
-        ("import sys\nsys.exit('no solver')", "ended with status 1: no solver"),
-        ("pass\n", "wrote no {out}"),
-        ("import sys\nopen(sys.argv[2], 'w').write('tip.x\\n1\\n')", "out.csv: found 1 rows"),
-        ("import sys\nopen(sys.argv[2], 'w').write('a\\n1\\n')", "out.csv: found the columns 'a'"),
-    ],
-)
+@pytest.mark.parametrize(("program", "text"), FAILING)
 def test_failing_program_is_an_error(judged, program, text):
     _, record = judged(program)
     assert record["outcome"] == "error"

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from io import StringIO
 from itertools import pairwise
 
 import msgspec
@@ -23,7 +24,7 @@ from kincheck.core.extensions.sweep.statistics import (
 from kincheck.core.extensions.sweep.study import Ready, Study, gradients
 from kincheck.core.extensions.sweep.study_choices import Sampling
 from kincheck.core.extensions.sweep.sweep import sweep_designs
-from kincheck.core.extensions.sweep.tables import without_gradients
+from kincheck.core.extensions.sweep.tables import print_sweep, without_gradients
 from kincheck.core.extensions.sweep.variation import DRAWN, Law, Limit
 from kincheck.core.jet import Jet
 from scipy import stats
@@ -86,6 +87,20 @@ def test_sweep_results_ignore_job_count(tmp_path):
     assert results(1) == results(2) == results(5)
 
 
+def test_quantiles_of_large_sweep_use_subset(tmp_path):
+    case, count = crank(), 40_000
+    variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
+    found = sweep_designs(case, variation, samples=count, seed=1, jobs=2)
+    assert 9_500 < found.quantiles_of < 10_500  # five standard errors of a share of a quarter
+    right = np.quantile(cranks(case, variation, 1, count), 0.95, axis=2)[1]
+    each = found.outputs["y"]
+    off = (np.array(each.quantiles["0.95"]) - right) / np.array(each.standard_errors["0.95"])
+    assert 0.0 < np.abs(off).max() < 5.0
+    print_sweep(found, text := StringIO())
+    assert "quantiles are of a random subset of" in text.getvalue()
+    assert each.count == [count] * 9
+
+
 def test_stillness_is_judged_per_variant():
     """A quotient by the speed of travel is left out where that is small beside the fastest point:
     of the same variant.
@@ -93,6 +108,18 @@ def test_stillness_is_judged_per_variant():
     one = np.ones((5, 2))
     fast = one * [1.0, 1e12]
     assert np.isnan(where_moving(Jet(one, one, one), (one, fast)).x).tolist() == [[False, True]] * 5
+
+
+def test_large_chunks_are_solved_in_parts(tmp_path):
+    case = crank(reference=False)
+    case = swept(case, np.linspace(-1.0, 1.0, 9001))
+    variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
+    ready = Ready.of(Study(case, variation, 300, 4))
+    assert 8 < ready.outputs.at_once < 64
+    parts, right = ready.chunk(0), cranks(case, variation, 4, 64)
+    np.testing.assert_allclose(np.concatenate(parts.kept, axis=2), right, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(parts.summary.mean, right.mean(axis=2), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(parts.summary.most, right.max(axis=2), rtol=0, atol=1e-14)
 
 
 def test_one_at_a_time_effects(tmp_path):
