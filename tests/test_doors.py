@@ -41,11 +41,11 @@ def found(fresh, monkeypatch):
 @pytest.fixture
 def installed(found, tmp_path, monkeypatch):
     """The package of the page, as its pyproject.toml installs it."""
-    for block in blocks(PAGE.read_text(encoding="utf-8")):
+    for block in blocks(PAGE.read_text("utf-8")):
         if block.title:
             file = tmp_path / block.title
             file.parent.mkdir(exist_ok=True)
-            file.write_text(block.text, encoding="utf-8")
+            file.write_text(block.text, "utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     found(bodies="kincheck_bodies:EXTENSION")
     yield

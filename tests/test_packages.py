@@ -16,7 +16,7 @@ WIDEST = 100
 
 
 def lines(path: Path) -> int:
-    return len((ROOT / path).read_text(encoding="utf-8").splitlines())
+    return len((ROOT / path).read_text("utf-8").splitlines())
 
 
 def test_source_files_are_short():
@@ -53,7 +53,7 @@ def test_harness_names_native_once():
     named = [
         str(path.relative_to(ROOT))
         for path in sorted((ROOT / "core" / "harness").rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(node, ast.Constant) and node.value == "native"
     ]
     assert named == ["core/harness/engine.py"]
@@ -65,7 +65,7 @@ def test_no_file_is_named_utils():
 
 def test_folders_of_sources_are_packages():
     """setup.py takes each folder of sources for one."""
-    setup = (ROOT / "setup.py").read_text(encoding="utf-8")
+    setup = (ROOT / "setup.py").read_text("utf-8")
     assert f'Path("{PACKAGE}")' in setup
     assert all((ROOT / path.parent / "__init__.py").exists() for path in SOURCES)
 

@@ -26,7 +26,10 @@ from ..support.engine_motion import (
     installed,
     mechanism_of,
 )
+from ..support.examples import examples
 from ..support.mechanisms import ORIGIN, X
+
+CASE, BAD_ARGUMENTS = examples(__file__, "case", "bad_arguments")
 
 TURNS = np.linspace(-7.0, 7.0, 29)
 
@@ -72,65 +75,6 @@ def test_gear_train_with_rack_moves_exactly(engine, closing):
 
 # q1 + 0.05/mm q2 - 2 q3 = 0 with q1 = t, q2 = 10 mm sin(pi t): q3 = t / 2 + 0.25 sin(pi t), whose
 # couple is -1/2 of that on the first joint; the arm of 2 kg at 0.3 m weighs on the third.
-CASE = """schema = "kincheck-case/1"
-name = "differential"
-source = "made for this test"
-truth = "closed_form"
-gravity = [0, -10000, 0]
-[units]
-length = "mm"
-[bodies.left]
-[bodies.rack]
-[bodies.cage]
-mass = 2
-center_of_mass = [300, 0, 0]
-[joints.left]
-type = "revolute"
-bodies = ["ground", "left"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[joints.rack]
-type = "translational"
-bodies = ["left", "rack"]
-point = [0, 0, 0]
-axis = [1, 0, 0]
-[joints.cage]
-type = "revolute"
-bodies = ["ground", "cage"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[couplers.sum]
-type = "linear_coupler"
-joints = ["left", "rack", "cage"]
-factors = [1, 0.05, -2]
-[drivers.left]
-type = "joint_angle"
-joint = "left"
-[drivers.rack]
-type = "joint_displacement"
-joint = "rack"
-[drivers.rack.motion]
-type = "sine"
-amplitude = 10
-frequency = 0.5
-[sweep]
-driver = "left"
-start = 0
-stop = 1
-steps = 5
-[outputs.cage]
-type = "joint_angle"
-joint = "cage"
-[outputs.effort]
-type = "driver_effort"
-driver = "left"
-[reference]
-columns = ["left", "cage", "cage.velocity", "cage.acceleration", "effort"]
-rows = [
-ROWS
-]
-citation = "the sum"
-"""
 
 
 def differential(folder):
@@ -177,12 +121,7 @@ def test_linear_coupler_in_written_files(tmp_path):
 
 @pytest.mark.parametrize(
     ("given", "said"),
-    [
-        ((("a", "b", "a"), (1.0, 1.0, 1.0)), "couples 'a' with itself"),
-        ((("a", "b", "c"), (1.0, 1.0)), "found 2, expected 3"),
-        ((("a", "b", "c"), (1.0, 0.0, 1.0)), "would lock or lose a joint"),
-        ((("a",), (1.0,)), "two names or more"),
-    ],
+    BAD_ARGUMENTS,
 )
 def test_linear_coupler_bad_arguments_are_refused(given, said):
     with pytest.raises(MechanismError, match=said):

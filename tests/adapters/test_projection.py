@@ -9,7 +9,10 @@ from kincheck.adapters.shared.projection import solve_by_projection
 from kincheck.core.case.case import Sweep
 
 from ..support.engine_motion import installed, mechanism_of, motion_case
+from ..support.examples import examples
 from ..support.mechanisms import ORIGIN, X, Z
+
+(MISSING,) = examples(__file__, "missing")
 
 CASE = motion_case(
     mechanism_of(
@@ -183,28 +186,7 @@ class Doubled(Crank):
 
 @pytest.mark.parametrize(
     ("gap", "push", "tol", "message"),
-    [
-        (0.0, 0.0, 1e-12, ""),
-        (
-            2e-3,
-            0.0,
-            1e-12,
-            (
-                "no assembly at the design position: no pose near there closes better than to 0.001"
-                " of the mechanism's size"
-            ),
-        ),
-        (
-            2e-15,
-            0.0,
-            1e-16,
-            (
-                "no assembly at the design position: the residual 1e-15 of the mechanism's size is"
-                " rounding, and the tolerance 1e-16 is less"
-            ),
-        ),
-        (0.0, 1.0, 1e-12, "at the design position the drivers cannot move"),
-    ],
+    MISSING,
 )
 def test_missing_design_pose_is_explained(gap, push, tol, message):
     found = solve_by_projection(Doubled(gap, push), CASE, tol)

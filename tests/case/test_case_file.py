@@ -28,7 +28,10 @@ from kincheck.core.joints.base import length, position
 from kincheck.core.mechanism.motions import Absolute
 
 from ..support.case_texts import BASE, INLINE, edited, write
+from ..support.examples import examples
 from ..support.mechanisms import X, Y, Z
+
+COUPLED, MOTION, CURVED, SWEEPS = examples(__file__, "coupled", "motion", "curved", "sweeps")
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "data" / "case_files").glob("*.toml"))
 
@@ -200,7 +203,7 @@ def test_default_tolerance_of_small_mechanism(tmp_path, where):
 
 @pytest.mark.parametrize(
     ("start", "stop", "steps", "values"),
-    [("0.1", "-0.1", "3", [0.1, 0.0, -0.1]), ("0.2", "0.2", "1", [0.2])],
+    SWEEPS,
 )
 def test_sweep_downwards_or_of_one_sample(tmp_path, start, stop, steps, values):
     text = edited(
@@ -244,74 +247,6 @@ def test_byte_order_mark_and_windows_lines(tmp_path):
     same(marked, load_case(write(tmp_path, BASE, "b.toml")))
 
 
-COUPLED = """
-schema = "kincheck-case/1"
-name = "steering/box"
-source = "made up for this test"
-[units]
-length = "mm"
-angle = "deg"
-[bodies.column]
-[bodies.pinion]
-[bodies.rack]
-[bodies.nut]
-[bodies.carrier]
-[joints.column_axle]
-type = "revolute"
-bodies = ["ground", "column"]
-point = [0, 0, 100]
-axis = [0, 0, 1]
-[joints.pinion_axle]
-type = "revolute"
-bodies = ["ground", "pinion"]
-point = [60, 0, 100]
-axis = [0, 0, 1]
-[joints.mesh]
-type = "gear"
-joints = ["column_axle", "pinion_axle"]
-ratio = -2.0
-[joints.guide]
-type = "translational"
-bodies = ["ground", "rack"]
-point = [60, 20, 100]
-axis = [1, 0, 0]
-[joints.rolls]
-type = "rack_pinion"
-joints = ["pinion_axle", "guide"]
-radius = -20
-[joints.thread]
-type = "screw"
-bodies = ["column", "nut"]
-point = [0, 0, 100]
-axis = [0, 0, 1]
-lead = 6
-[joints.upright]
-type = "orientation_lock"
-bodies = ["ground", "nut"]
-[joints.hangs]
-type = "spherical"
-bodies = ["nut", "carrier"]
-point = [0, 10, 100]
-[joints.level]
-type = "orientation_lock"
-bodies = ["ground", "carrier"]
-[points.rack_end]
-body = "rack"
-position = [160, 20, 100]
-[points.nut]
-body = "carrier"
-position = [0, 10, 100]
-[drivers.turn]
-type = "joint_angle"
-joint = "column_axle"
-[sweep]
-driver = "turn"
-start = -360
-stop = 360
-steps = 9
-"""
-
-
 def solved(case):
     found = Native().solve(Native().build(case), case, 1e-12)
     assert found.solved.all()
@@ -339,30 +274,6 @@ def test_gear_rack_and_screw_move(tmp_path):
     assert found.points["nut"].position[:, 2] == pytest.approx(
         0.1 - 0.006 * turn / (2.0 * np.pi), abs=1e-14
     )
-
-
-MOTION = """[drivers.turn.motion]
-type = "sine"
-amplitude = 90
-frequency = 2
-phase = 45
-[drivers.shift]
-type = "joint_displacement"
-joint = "guide"
-[drivers.shift.motion]
-type = "ramp"
-rate = 3
-[drivers.hang]
-type = "point_coordinate"
-point = "rack_end"
-direction = [0, 3, 4]
-relative = false
-[drivers.hang.motion]
-type = "table"
-times = [0, 1.5]
-values = [10, 20]
-[sweep]
-"""
 
 
 def test_driver_motions_in_file_units(tmp_path):
@@ -394,30 +305,6 @@ def test_motion_table_covers_rounded_times(tmp_path):
         ("= 2.0", "= 0.7"),
     )
     assert load_case(write(tmp_path, push)).sweep.path.times[-1] > 3.0
-
-
-CURVED = """schema = "kincheck-case/1"
-name = "knee"
-source = "test"
-units = {length = "mm", angle = "deg"}
-bodies = {carriage = {}, shank = {}}
-[joints]
-slide = {type = "translational", bodies = ["ground", "carriage"], point = [0, 0, 0], axis = [1, 0, 0]}
-flex = {type = "revolute", bodies = ["carriage", "shank"], point = [0, 0, 0], axis = [0, 1, 0]}
-[couplers]
-knee = {type = "polynomial", joints = ["slide", "flex"], coefficients = [0, 0.2, -0.006, 2e-5, 1e-7]}
-[points.pin]
-body = "carriage"
-position = [0, 0, 0]
-[drivers.flex]
-type = "joint_angle"
-joint = "flex"
-[sweep]
-driver = "flex"
-start = 0
-stop = 90
-steps = 7
-"""  # noqa: E501
 
 
 def test_polynomial_coupler_in_file_units(tmp_path):

@@ -11,6 +11,9 @@ from kincheck import CaseError
 from kincheck.core.case.io.case_file import load_case
 
 from ..support.case_texts import BASE, BY_FILE, INLINE, complains, edited, rows, write
+from ..support.examples import examples
+
+DRIVEN_BROKEN, BROKEN_JSON = examples(__file__, "driven_broken", "broken_json")
 
 BROKEN = {
     row.id: row.values
@@ -164,13 +167,7 @@ def test_unreadable_case_file_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "fragments"),
-    [
-        ("[1, 2]", "found [1, 2] ... expected the keys of a case"),
-        ("{", "not valid JSON"),
-        ('{"name": "a", "name": "b"}', "not valid JSON ... 'name' is given twice"),
-        ('{"schema": "kincheck-case/1", "name": "a", "source": "\\ud800"}', "source ... printable"),
-        ('{"schema": NaN}', "schema ... nan"),
-    ],
+    BROKEN_JSON,
 )
 def test_broken_json_case_is_refused(tmp_path, text, fragments):
     complains(write(tmp_path, text, "case.json"), f"case.json ... {fragments}")
@@ -214,70 +211,6 @@ PUSH = '[drivers.push.motion]\ntype = "ramp"\nrate = 1\n'
 MESH = DRIVEN[DRIVEN.index("[joints.mesh]") : DRIVEN.index("[drivers.turn]")]
 TIME = ('driver = "push"', 'driver = "time"')
 NO_RATE = ("rate = 2.0\n", "")
-DRIVEN_BROKEN = {
-    row.id: row.values
-    for row in rows("""
-bodies of a gear | joints = ["axle" | bodies = ["axle"
-    | joints.mesh.bodies ... unknown key ... joints, ratio
-no joints | joints = ["axle", "pivot"]\\n |
-    | joints.mesh.joints ... missing ... ["first joint", "second joint"]
-three joints | ["axle", "pivot"] | ["axle", "pivot", "guide"] | joints.mesh.joints ... two names
-unknown joint | ["axle", "pivot"] | ["axle", "pivt"]
-    | joints.mesh.joints ... 'pivt' ... did you mean 'pivot'
-the same joint | ["axle", "pivot"] | ["axle", "axle"] | joints.mesh ... couples 'axle' with itself
-no such freedom | ["axle", "pivot"] | ["axle", "guide"]
-    | joints.mesh.joints ... 'guide' is ... no rotation
-no ratio | ratio = -2.0 |  | joints.mesh.ratio ... missing ... a number
-zero ratio | ratio = -2.0 | ratio = 0 | joints.mesh ... ratio = 0.0 ... other than zero
-ratio of text | ratio = -2.0 | ratio = "2:1" | joints.mesh.ratio ... '2:1' ... a number
-radius of a gear | ratio = -2.0 | radius = 1 | joints.mesh.radius ... unknown key ... ratio
-joints of a revolute | bodies = ["ground", "crank"] | joints = ["axle", "guide"]
-    | joints.pivot.joints ... unknown key
-unknown motion | type = "table" | type = "tabel"
-    | drivers.turn.motion.type ... 'tabel' ... did you mean 'table'
-no motion type | type = "table" |  | drivers.turn.motion.type ... expected a motion type
-motion is a number
-    | [drivers.turn.motion]\\ntype = "table"\\ntimes = [-1, 0, 1]\\nvalues = [0.5, 0, 0.5]\\n
-    | motion = 3\\n | drivers.turn.motion ... found 3 ... a table
-unknown key of a motion | times = [-1, 0, 1] | rate = 1
-    | drivers.turn.motion.rate ... unknown key ... times, values
-no values | values = [0.5, 0, 0.5]\\n |
-    | drivers.turn.motion.values ... missing ... a list of numbers
-fewer values | [0.5, 0, 0.5] | [0.5, 0] | drivers.turn.motion ... 3 times and 2 values
-times back and forth | [-1, 0, 1] | [-1, 1, 0] | drivers.turn.motion ... times do not increase
-NaN in a table | [0.5, 0, 0.5] | [0.5, nan, 0.5] | drivers.turn.motion.values[1] ... nan
-table too short | [-1, 0, 1] | [-0.01, 0, 1]
-    | drivers.turn.motion ... from -0.01 to 1 s ... -0.05 to 0.05 s
-nothing moves in time | driver = "push" | driver = "time" | rate = 2.0\\n |
-    | [drivers.turn.motion]\\ntype = "table"\\ntimes = [-1, 0, 1]\\nvalues = [0.5, 0, 0.5]\\n |
-    | sweep.driver ... found 'time' ... no driver has a motion
-nothing moves | driver = "push"\\n |  | rate = 2.0\\n |
-    | [drivers.turn.motion]\\ntype = "table"\\ntimes = [-1, 0, 1]\\nvalues = [0.5, 0, 0.5]\\n |
-    | sweep.driver ... missing ... name the driver to sweep
-rate of time | driver = "push" | driver = "time"
-    | sweep.rate ... found 2.0 ... sweep of time ... remove it
-rate without driver | driver = "push"\\n |
-    | sweep.rate ... found 2.0 ... name the driver to sweep
-driver called time | [drivers.turn] | [drivers.time]
-    | [drivers.turn.motion]\\ntype = "table"\\ntimes = [-1, 0, 1]\\nvalues = [0.5, 0, 0.5]\\n |
-    | drivers.time ... rename the driver
-time stands still | driver = "push" | driver = "time" | rate = 2.0\\n |  | stop = 0.1
-    | stop = -0.1 | sweep.stop ... found the start
-overflowing motion | [-1, 0, 1] | [-1, -1e-100, 0, 1e-100, 1] | [0.5, 0, 0.5]
-    | [0, 1e100, -1e100, 1e100, 0] | drivers.turn.motion ... overflow
-""")
-} | {
-    "coupled coupler": (
-        MESH,
-        MESH + '[joints.more]\ntype = "gear"\njoints = ["mesh", "axle"]\nratio = 1\n',
-        "joints.more.joints ... no joint 'mesh'",
-    ),
-    "motion of the swept": (
-        TURN,
-        TURN + PUSH,
-        'drivers.push.motion ... swept driver ... driver = "time"',
-    ),
-}
 
 
 @pytest.mark.parametrize("kind", DRIVEN_BROKEN)

@@ -24,26 +24,11 @@ from kincheck.core.mechanism.loads import ELEMENTS
 from kincheck.core.mechanism.motions import Motion
 
 from ..support.case_texts import validator
+from ..support.examples import examples
+
+FAULTS, ROWS = examples(__file__, "faults", "rows")
 
 # Rows as in textbooks: six less the freedoms left.
-ROWS = {
-    "constant_velocity": 4,
-    "cylindrical": 4,
-    "distance": 1,
-    "fixed": 6,
-    "in_plane": 1,
-    "inline": 2,
-    "orientation_lock": 3,
-    "parallel_axes": 2,
-    "perpendicular_axes": 1,
-    "planar": 3,
-    "revolute": 5,
-    "revolute_spherical": 2,
-    "screw": 5,
-    "spherical": 3,
-    "translational": 5,
-    "universal": 4,
-}
 
 
 def types():
@@ -155,35 +140,12 @@ def case():
 
 
 def read(path):
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+    return tomllib.loads(path.read_text("utf-8"))
 
 
 def test_case_files_satisfy_schema(case):
     assert len(CASES) >= 32
     assert {path.name: found for path in OURS if (found := [*case.iter_errors(read(path))])} == {}
-
-
-FAULTS = [
-    ("drivers", "crank", "joint", 3),
-    ("drivers", "crank", "type", "joint_angel"),
-    ("joints", "rod", "points", [[0, 0, 0]]),
-    ("joints", "rod", "axis", [0, 0, 1]),
-    ("joints", "rod", "type", "distanse"),
-    ("bodies", "crank", "origin", [0, 0]),
-    ("points", "rocker_tip", "position", "here"),
-    ("sweep", "steps", 0),
-    ("sweep", "stop", "far"),
-    ("units", {"length": "inch"}),
-    ("outputs", "rocker_tip_y", "component", "w"),
-    ("schema", "kincheck-case/2"),
-    ("colour", "red"),
-    ("outputs", "crank_torque", "driver", 3),
-    ("outputs", "rod_force_y", "joints", "rod"),
-    ("outputs", "rod_force_y", "type", "joint_fource"),
-    ("forces", {"spring": {"type": "spring_damper", "bodies": ["crank"], "stiffness": 1.0}}),
-    ("closure", "tolerance", "small"),
-    ("drivers", "crank", "motion", {"type": "sine", "amplitude": 1.0}),
-]
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: ".".join(map(str, fault[:-1])))

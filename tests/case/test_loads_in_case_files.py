@@ -13,66 +13,19 @@ from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.harness.run import run
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 
-from ..support.case_texts import complains, edited, rows, write
+from ..support.case_texts import complains, edited, write
 from ..support.engine_forces import force_case
+from ..support.examples import examples
 from ..support.loaded_slider_crank import loaded
 from ..support.loads import loaded as with_loads
 from ..support.loads import six
 from ..support.mechanisms import BRANCH, chain
 
-PLAIN = """
-schema = "kincheck-case/1"
-name = "loaded"
-source = "made up for this test"
-[units]
-length = "mm"
-angle = "deg"
-[joints.pin]
-type = "revolute"
-bodies = ["ground", "arm"]
-point = [0.0, 0.0, 0.0]
-axis = [0.0, 1.0, 0.0]
-[points.tip]
-body = "arm"
-position = [300.0, 0.0, 0.0]
-[drivers.turn]
-type = "joint_angle"
-joint = "pin"
-[sweep]
-driver = "turn"
-start = 0.0
-stop = 30.0
-steps = 3
-[bodies.arm]
-"""
+WRONG, PLAIN, FORCES = examples(__file__, "wrong", "plain", "forces")
+
 MASS = """mass = 2.5
 center_of_mass = [150.0, 0.0, 0.0]
 inertia = [250.0, 7300.0, 7400.0, 3.0, -20.0, 0.125]
-"""
-FORCES = """
-[forces.spring]
-type = "spring_damper"
-bodies = ["ground", "arm"]
-points = [[100.0, 0.0, 300.0], [100.0, 0.0, 0.0]]
-stiffness = 25.3
-damping = 1.7
-free_length = 290.1
-[forces.clock]
-type = "torsion_spring_damper"
-joint = "pin"
-stiffness = 900.0
-damping = 18.0
-free_angle = -45.0
-[forces.push]
-type = "force"
-body = "arm"
-point = [300.0, 0.0, 0.0]
-vector = [0.0, 0.0, -40.0]
-frame = "body"
-[forces.twist]
-type = "torque"
-body = "arm"
-vector = [0.0, 700.5, 0.0]
 """
 ALL = PLAIN.replace("[units]", "gravity = [0.0, 0.0, -9806.65]\n[units]") + MASS + FORCES
 
@@ -120,55 +73,6 @@ def test_loads_with_defaults(tmp_path):
     assert mechanism.body("arm") == Body("arm", (0.01, 0.0, 0.0), mass=2.5)
     spring = mechanism.force("spring")
     assert (spring.damping, spring.free_length) == (0.0, 0.3)
-
-
-WRONG = {
-    row.id: row.values
-    for row in rows("""
-negative mass | mass = 2.5 | mass = -1 | bodies.arm.mass ... found -1 ... not negative
-mass that is no number | mass = 2.5 | mass = nan | bodies.arm.mass ... nan
-centre of two | [150.0, 0.0, 0.0] | [1, 2] | bodies.arm.center_of_mass ... [x, y, z]
-inertia of three | [250.0, 7300.0, 7400.0, 3.0, -20.0, 0.125] | [1, 1, 1]
-    | bodies.arm.inertia ... six numbers [Ixx, Iyy, Izz, Ixy, Iyz, Ixz]
-inertia without mass | mass = 2.5 | mass = 0 | bodies.arm.inertia ... has an inertia, but no mass
-gravity of one | [0.0, 0.0, -9806.65] | -9806.65 | gravity ... three numbers
-infinite gravity | -9806.65 | inf | gravity[2] ... inf
-unknown type | "torque" | "torqe" | forces.twist.type ... did you mean 'torque'?
-no type | type = "torque" |  | forces.twist.type ... missing
-unknown key | damping = 1.7 | dampin = 1.7 | forces.spring.dampin ... 'damping'
-no stiffness | stiffness = 25.3 |  | forces.spring.stiffness ... missing
-negative stiffness | = 25.3 | = -2 | forces.spring.stiffness ... found -2
-negative damping | = 18.0 | = -2.0 | forces.clock.damping ... not negative
-negative length | = 290.1 | = -2.0 | forces.spring.free_length ... not negative
-one point | [[100.0, 0.0, 300.0], [100.0, 0.0, 0.0]] | [100.0, 0.0, 300.0]
-    | forces.spring.points ... two points
-spring on one body | bodies = ["ground", "arm"]\\npoints | bodies = ["arm", "arm"]\\npoints
-    | forces.spring.bodies ... two different bodies
-spring on an unknown body | bodies = ["ground", "arm"]\\npoints
-    | bodies = ["ground", "amr"]\\npoints | forces.spring.bodies ... did you mean 'arm'?
-unknown joint | "pin"\\nstiff | "pn"\\nstiff | forces.clock.joint ... mean 'pin'?
-unknown body | "arm"\\nvector | "am"\\nvector | forces.twist.body ... mean 'arm'?
-unknown frame | frame = "body" | frame = "local" | forces.push.frame ... "global" or
-vector of four | [0.0, 700.5, 0.0] | [0, 1, 2, 3] | forces.twist.vector ... [x, y, z]
-no table | [forces.twist] | [forces]\\ntwist = 3\\n[x] | x ... unknown key
-""")
-} | {
-    "inertia that breaks the triangle": (
-        "[250.0, 7300.0, 7400.0, ",
-        "[250.0, 7300.0, 17400.0, ",
-        "bodies.arm.inertia ... 17400.0 ... triangle inequality ...  kg mm^2, ",
-    ),
-    "negative inertia": (
-        "[250.0, 73",
-        "[-250.0, 73",
-        "bodies.arm.inertia ... not positive definite ...  kg mm^2, ",
-    ),
-    "spring of no length": (
-        "[[100.0, 0.0, 300.0], ",
-        "[[100.0, 0.0, 0.0], ",
-        "forces.spring.points ... coincide at x = 100.0 mm, y = 0.0 mm ... two ends",
-    ),
-}
 
 
 @pytest.mark.parametrize("name", WRONG)

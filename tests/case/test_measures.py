@@ -23,8 +23,11 @@ from kincheck.core.harness.run import run
 from scipy.spatial.transform import Rotation
 
 from ..support.case_texts import BASE, complains, edited, write
+from ..support.examples import examples
 from ..support.measure_cases import AXIS, RATE, arm
 from ..support.written_again import written_again
+
+WRONG, MEASURES = examples(__file__, "wrong", "measures")
 
 TOLERANCE = (1e-9, 0.0, "test")
 
@@ -165,36 +168,6 @@ def test_measure_without_points():
     close(series(case, HINGE), 0.1, RATE, 0.0)
 
 
-MEASURES = """
-[outputs.length]
-type = "distance"
-points = ["home", "tip"]
-relative = true
-[outputs.stroke]
-type = "joint_displacement"
-joint = "guide"
-atol = 0.5
-why = "test"
-[outputs.turn]
-type = "orientation"
-body = "slider"
-component = "y"
-atol = 2.0
-why = "test"
-[outputs.e2]
-type = "orientation"
-body = "slider"
-component = "e2"
-[outputs.open]
-type = "angle"
-bodies = ["ground", "slider"]
-directions = [[1, 0, 0], [0, 0.5, 0]]
-[points.home]
-body = "ground"
-position = [0.0, 0.0, 0.0]
-"""
-
-
 OUTPUT = (
     '[outputs.tip_x]\npoint = "tip"\ncomponent = "x"\natol = 1e-9\nwhy = "made up for this test"\n'
 )
@@ -224,17 +197,6 @@ def test_measures_in_case_file(tmp_path):
 FREE = ('"joint_displacement"\njoint = "guide"\natol', '"joint_angle"\njoint = "guide"\natol')
 NOBODY = ('body = "slider"\ncomponent = "e2"', 'body = "bed"\ncomponent = "e2"')
 FEW = ("[[1, 0, 0], [0, 0.5, 0]]", "[[1, 0, 0]]")
-WRONG = [
-    (('["home", "tip"]', '["home", "top"]'), "outputs.length.points ... 'top' ... 'tip'?"),
-    (('["home", "tip"]', '["home"]'), "outputs.length.points ... two names ... first point"),
-    (('joint = "guide"\natol', 'joint = "guid"\natol'), "outputs.stroke.joint ... 'guide'?"),
-    (FREE, "outputs.stroke.joint ... no rotation to measure ... translation"),
-    (('component = "y"', 'component = "w"'), "outputs.turn.component ... one of x, y, z, e0"),
-    (NOBODY, "outputs.e2.body ... 'bed'"),
-    (("[0, 0.5, 0]", "[0, 0, 0]"), "outputs.open.directions ... zero"),
-    (FEW, "outputs.open.directions ... two directions"),
-    (('type = "angle"', 'type = "angel"'), "outputs.open.type ... 'angle'?"),
-]
 
 
 @pytest.mark.parametrize(("change", "fragments"), WRONG, ids=str)

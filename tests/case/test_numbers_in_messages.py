@@ -13,35 +13,10 @@ from kincheck.core.case.notes import notes
 from kincheck.core.case.units import ANGLES, LENGTHS, plain
 
 from ..support.case_texts import write
+from ..support.examples import examples
 
-TEXT = """
-schema = "kincheck-case/1"
-name = "rod"
-source = "made up for this test"
-truth = "third_party_data"
-[units]
-length = "LENGTH"
-angle = "ANGLE"
-[bodies.crank]
-[joints.pivot]
-type = "revolute"
-bodies = ["ground", "crank"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[points.tip]
-body = "crank"
-position = [SIDE, SIDE, 0]
-[drivers.turn]
-DRIVER
-[sweep]
-driver = "turn"
-start = START
-stop = STOP
-steps = 2
-[outputs.x]
-point = "tip"
-component = "x"
-"""
+TEXT, QUOTED = examples(__file__, "text", "quoted")
+
 TURN = 'type = "joint_angle"\njoint = "pivot"'
 SHIFT = 'type = "point_coordinate"\npoint = "tip"\ndirection = [1, 0, 0]'
 ROD = (
@@ -138,7 +113,7 @@ wheel_center,0.2,WHEEL,0
 
 
 @pytest.mark.needs("hardpoints")
-@pytest.mark.parametrize("unit", [*LENGTHS])
+@pytest.mark.parametrize("unit", QUOTED)
 @pytest.mark.parametrize(
     ("upper", "wheel", "axes", "words"),
     [

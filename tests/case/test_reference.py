@@ -26,6 +26,11 @@ from kincheck.core.harness.run import run
 from scipy.interpolate import CubicSpline
 
 from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write
+from ..support.examples import examples
+
+UNITS, PRINTED, WRONG_UNITS, IN_GERMAN, IN_CSV, NO_TABLES = examples(
+    __file__, "units", "printed", "wrong_units", "in_german", "in_csv", "no_tables"
+)
 
 GERMAN = "push;tip_x;tip_x.velocity\n-0,1;1,4;2,0\n0,0;1,5;2,0\n0,1;1,6;2,0\n"
 DIALECTS = {
@@ -72,32 +77,9 @@ def test_output_without_reference(tmp_path):
 
 
 REFERENCES = [
-    (GERMAN.replace("1,5", "1.5"), "line 3 ... '1.5' ... '-0,1' above ... one decimal"),
-    (GERMAN.replace("1,5", "=B2"), "line 3, column tip_x ... '=B2' ... correct it"),
-    ("%PDF-1.7", "found a PDF document, expected text"),
-    (
-        CSV.replace("\n 0.0", "\n0.01"),
-        ("line 5 ... 0.01 m ... the nearest is 0 m ... expected 4 rows ... found 3"),
-    ),
-    (CSV.replace("1.5", "1_5"), "line 5 ... column tip_x ... '1_5' ... correct it"),
-    (CSV.replace("1.5", "nan"), "line 5 ... column tip_x ... 'nan' ... finite"),
-    (CSV.replace("1.5", "1e308"), "line 5 ... column tip_x ... '1e308' ... at most 1e+100"),
-    (CSV.replace("1.5", ""), "line 5 ... column tip_x ... expected a finite number"),
-    (CSV.replace("1.5, ", ""), "line 5 ... found 2 numbers ... expected 3"),
-    (CSV.replace("tip_x,", "tip_z,"), "line 3 ... 'tip_z' ... did you mean 'tip_x'"),
-    (
-        CSV.replace("tip_x,", "tip_x.acceleration,"),
-        "'tip_x.acceleration' alone ... add the column 'tip_x'",
-    ),
-    (CSV.replace("tip_x.velocity", "tip_x"), "'tip_x' twice"),
-    (
-        CSV.replace("push, ", "tip_x, "),
-        ("'tip_x' first, the name of an output ... driver values ... name it otherwise"),
-    ),
-    ("push\n-0.1\n0\n0.1\n", "no column of an output"),
-    ("-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "line 1 ... '1.4' ... outputs of the case"),
-    ('push, "tip_x\n', "not valid CSV"),
-    ("# nothing\n", "no samples"),
+    *((GERMAN.replace(old, new), said) for old, new, said in IN_GERMAN),
+    *((CSV.replace(old, new), said) for old, new, said in IN_CSV),
+    *NO_TABLES,
 ]
 
 
@@ -118,15 +100,6 @@ def test_reference_below_folder_is_read(tmp_path):
     (tmp_path / "data").mkdir()
     write(tmp_path / "data", CSV, "tip.csv")
     assert load_case(write(tmp_path, BASE + BY_FILE.replace("tip.csv", "data/tip.csv"))).reference
-
-
-UNITS = {
-    "in brackets": "push [mm], tip_x [mm], tip_x.velocity [mm/s]",
-    "in parentheses": "push (mm), tip_x (mm), tip_x.velocity (mm/s)",
-    "as last words": "push_mm, tip_x mm, tip_x.velocity mm/s",
-    "below": "push, tip_x, tip_x.velocity\nmm, mm, mm/s",
-    "twice alike": "push_mm [mm], tip_x (mm), tip_x.velocity [mm/s]\n, mm, mm/s",
-}
 
 
 @pytest.mark.parametrize("at", ["", 'at = "reference"'])
@@ -154,13 +127,7 @@ def test_inline_reference_column_units(tmp_path):
 
 @pytest.mark.parametrize(
     ("head", "fragments"),
-    [
-        ("push [deg], tip_x", "line 1 ... 'deg' of column 'push [deg]' ... a length: m, mm"),
-        ("push, tip_x [parsec]", "line 1 ... 'parsec' ... a length"),
-        ("push, tip_x [mm/s]", "line 1 ... 'mm/s' ... a length"),
-        ("push, tip_x_mm [m]", "line 1 ... in 'mm' and 'm' ... one unit"),
-        ("push, tip_y [mm]", "line 1 ... column 'tip_y [mm]' ... tip_x"),
-    ],
+    WRONG_UNITS,
 )
 def test_wrong_column_unit_is_refused(tmp_path, head, fragments):
     write(tmp_path, f"{head}\n-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "tip.csv")
@@ -359,25 +326,7 @@ def test_sweep_at_missing_reference(tmp_path):
 
 @pytest.mark.parametrize(
     ("texts", "half"),
-    [
-        ("0.123457 0.500000 -12.345678", 5e-7),
-        ("0.123457 0.5 -12.3457", [5e-7, 5e-7, 5e-5]),
-        ("1.23457e-03 5.00000e+02", [5e-9, 5e-4]),
-        ("0.4 0.412 0.05", 5e-4),  # a spreadsheet leaves out zeros at the end
-        ("12.3 0.412 1.57", [5e-2, 5e-4, 5e-3]),
-        ("12.3 0.412 0.05 1.571", [5e-3, 5e-4, 5e-4, 5e-4]),
-        ("1.5e-3 2.25e-2", 5e-5),
-        ("0.25 0.5 1.75", 5e-3),
-        ("100 1234 1200", 0.5),
-        ("1 0 -1", 0.5),
-        ("123457 7.5", [0.5, 0.05]),
-        ("9.7361 10.0332 200 0.5 0", [5e-5, 5e-5, 5e-4, 5e-5, 5e-5]),
-        ("0 0.0", 0.0),  # no digit that anything could be rounded to
-        ("0.000 0.000", 5e-4),
-        ("0.1234567890123456 0.5", 0.0),
-        ("0.0 0.00012", 5e-6),
-        ("0.00000 0.12345", 5e-6),
-    ],
+    PRINTED,
 )
 def test_half_unit_of_printed_digits(texts, half):
     np.testing.assert_allclose(printed(texts)[1], half, rtol=1e-9)

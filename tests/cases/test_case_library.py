@@ -27,8 +27,11 @@ from kincheck.cases.vectors import Circle
 from kincheck.core.case.case import Output, Truth, without_forces
 from kincheck.core.harness.compare import deviations, output_series
 
+from ..support.examples import examples
 from ..support.fakes import swept
 from ..support.mechanisms import ORIGIN, X, Z
+
+(REDUNDANT,) = examples(__file__, "redundant")
 
 CASES = {name: cases.load(name) for name in cases.names()}
 
@@ -150,18 +153,7 @@ def test_closed_form_rates_equal_complex_step(name):
 
 @pytest.mark.parametrize(
     ("name", "redundant"),
-    [
-        ("four_bar", 3),
-        ("planar_slider_crank", 3),
-        ("five_bar", 3),
-        ("hooke_joint", 3),
-        ("double_cardan", 1),
-        ("bricard", 1),
-        ("bennett", 3),
-        ("andrews_squeezer", 9),
-        ("iftomm_n_four_bar", 9),
-        ("gough_platform", 0),
-    ],
+    REDUNDANT,
 )
 def test_case_redundant_rows_are_counted(name, redundant):
     _, found = solved(name)

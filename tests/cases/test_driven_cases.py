@@ -178,7 +178,7 @@ def test_driven_case_run_and_report(tmp_path, name, swept):
         "phase": 0.0,
     }
     write_report(results, tmp_path / "report.html")
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "report.html").read_text("utf-8")
     said = {"stroke": "Also driven: steer (sine).", "time": "Driven: stroke (sine), steer (sine)."}[
         swept
     ]

@@ -16,8 +16,11 @@ from kincheck.core.report.junit import to_junit
 from kincheck.core.report.report import caveats
 
 from ..support.case_texts import rows
+from ..support.examples import examples
 from ..support.fakes import Fake, off
 from .test_cli import BROKEN, MISSING, PARTIAL, RIGHT, UNABLE, WRONG
+
+(ROD,) = examples(__file__, "rod")
 
 
 def test_json_output_excludes_engine_prints(kincheck_main, capfd):
@@ -47,41 +50,6 @@ def test_json_only_flushes_c_buffers():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered
     )
     assert (done.stdout, done.stderr) == ("json\n", "from C\n")
-
-
-ROD = """
-schema = "kincheck-case/1"
-name = "rod"
-source = "made up"
-[bodies.crank]
-[bodies.rocker]
-[joints.pivot]
-type = "revolute"
-bodies = ["ground", "crank"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[joints.hinge]
-type = "revolute"
-bodies = ["ground", "rocker"]
-point = [1, 0, 0]
-axis = [0, 0, 1]
-[joints.rod]
-type = "distance"
-bodies = ["crank", "rocker"]
-points = [[0, 0.5, 0], [1, 0.5, 0]]
-length = LENGTH
-[points.tip]
-body = "rocker"
-position = [1, 0.5, 0]
-[drivers.turn]
-type = "joint_angle"
-joint = "pivot"
-[sweep]
-driver = "turn"
-start = 0
-stop = 0.1
-steps = 3
-"""
 
 
 @pytest.mark.parametrize(

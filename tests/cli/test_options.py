@@ -8,6 +8,9 @@ from kincheck.core.case.io.atomic_files import unwritable
 from kincheck.core.cli.main import every_command, main
 
 from ..support.case_texts import at_hand, rows
+from ..support.examples import examples
+
+(REFUSED,) = examples(__file__, "refused")
 
 COMMANDS = every_command()
 VARY = """
@@ -19,66 +22,6 @@ at = "ball"
 sigma = 1.0
 """
 
-REFUSED = """
-assemblies rssr --number 2 | --number: only an export uses it. Add --export
-assemblies rssr --out x.xml --number 1 | --number, --out: only an export
-assemblies rssr --export mjcf --number 0 | '0' is not a whole number of 1 or more
-explain rssr --samples 0 | '0' is not a whole number of 1 or more
-explain rssr --samples -1 | '-1' is not a whole number of 1 or more
-stress --list --seed 0 --out x | --list runs nothing. Leave out --seed, --out
-stress --list --replay x.toml --no-proofs | --list runs nothing. Leave out --no-proofs, --replay
-stress --list --engine native --mode projection | --list runs nothing. Leave out --engine, --mode
-stress --replay x.toml --seed 0
-    | --replay judges files, which belong to no family. Leave out --seed
-stress --replay x.toml --samples 2000 --no-proofs --family units
-    | Leave out --family, --samples, --no-proofs
-stress --family units --tol 1e-12
-    | --tol is for replayed files, and families have their own tolerances. Leave it
-run rssr --memory 1e300 | argument --memory: '1e300' is too large. Give 1e+09 at most.
-run rssr --timeout 2e9 | argument --timeout: '2e9' is too large. Give 1e+09 at most.
-run rssr --out= | argument --out: found an empty name; give one, or leave it out
-run --joints rssr --reactions | --reactions: the loops of --joints have no masses
-kc rssr --travel -60mm:60mm:5 | rssr: no point is the wheel's centre
-kc rssr --jobs 0 --timeout 5 --engine native | cannot be limited. Leave out --timeout
-run rssrr | did you mean 'rssr'? Case files end in
-sweep rssr --vary x --sampling ltin
-    | 'ltin' is none of random, latin, sobol; did you mean 'latin'?
-sweep rssr --vary x --order x | 'x' is none of 0, 1, 2
-stress --family unit | there is no family 'unit'; did you mean 'units'?
-stress --engine nativ | there is no engine 'nativ'
-stress --samples 0 | '0' is not a whole number of 1 or more
-serve rssr --port abc | --port: 'abc' is not a whole number of 0 or more
-run rssr --accuracy 0.02 --signs iso8855
-    | --signs, --accuracy: for a measured curve, and there is none; add --reference FILE
-serve rssr --accuracy 0.02 | --accuracy: for a measured curve, and there is none
-stress --replay nowhere.toml | no such file
-stress --tol -1 | is not a positive number
-sweep mcpherson_strut --vary vary.toml --samples 0 | '0' is not a whole number of 1 or more
-sweep mcpherson_strut --vary vary.toml
-    | monte_carlo draws as many variants as it is told. Give --samples
-sweep mcpherson_strut --vary vary.toml --samples 5 --check mujocco
-    | there is no engine 'mujocco'; did you mean 'mujoco'?
-sweep mcpherson_strut --vary vary.toml --samples 5 --check native:2
-    | --check native:2: found the share '2', expected a fraction
-sweep mcpherson_strut --vary vary.toml --samples 5 --output toe
-    | there is no output 'toe'; known: half_track_change, wheelbase_change
-sweep mcpherson_strut --vary vary.toml --samples 5 --replay 3
-    | --replay: seed and index identify a variant. Leave out --samples
-sweep mcpherson_strut --vary vary.toml --replay 3 --store x.parquet
-    | in this process and stores nothing
-sweep mcpherson_strut --vary vary.toml --samples 5 --jobs 2 --scheduler tcp://127.0.0.1:1
-    | the cluster decides the number of threads
-sweep mcpherson_strut --vary vary.toml --samples 5 --store no/such/folder.parquet
-    | cannot be written; give a file in a folder that exists
-sweep mcpherson_strut --vary vary.toml --samples 5 --limit half_track_change:1
-    | --limit: found 'half_track_change:1', expected OUTPUT:
-sweep mcpherson_strut --vary vary.toml --samples 5 --limit toe:0:1
-    | --limit toe:0:1: there is no output 'toe'
-sweep mcpherson_strut --vary vary.toml --samples 5 --limit half_track_change:a:b
-    | expected OUTPUT:LOW:HIGH
-sweep mcpherson_strut --vary vary.toml --sampling latin --replay 1
-    | a Latin hypercube depends on the number of variants. Give --samples
-"""
 ONE_FILE = """
 run rssr --json a --junit a | --junit | --json
 run rssr --junit a --markdown ./no/../a | --markdown | --junit

@@ -9,32 +9,17 @@ from pathlib import Path
 import pytest
 from kincheck.core.cli.main import every_command, main
 
-VARY = {
-    "schema": "kincheck-vary/1",
-    "mode": "monte_carlo",
-    "units": {"length": "m"},
-    "hardpoints": {"ball": {"at": "joints.ball.point", "sigma": 1e-4}},
-}
-SWEEP = ("sweep", "mcpherson_strut", "--vary", "vary.json", "--samples", "8")
+from ..support.examples import examples
+
+VARY, COMMANDS = examples(__file__, "vary", "commands")
+
+SWEEP = "sweep mcpherson_strut --vary vary.json --samples 8".split()
 OPTIONS = [
-    *(
-        (("run", "five_bar", "--engine", "native"), option)
-        for option in ("--json", "--csv", "--junit", "--markdown")
-    ),
-    *((("report", "--history", "kept"), option) for option in ("--json", "--junit", "--markdown")),
-    (("history", "--history", "kept"), "--plot"),
-    (("history", "--history", "kept"), "--export"),
-    *((SWEEP, option) for option in ("--json", "--store")),
-    (("explain", "five_bar"), "--json"),
-    (("assemblies", "five_bar"), "--json"),
-    (("assemblies", "five_bar", "--export", "mjcf"), "--out"),
-    (("doctor",), "--json"),
-    (("export", "five_bar", "--to", "mjcf"), "--out"),
-    (("import", "model.toml"), "--out"),
-    (("stress", "--family", "arms", "--samples", "1"), "--json"),
-    (("bench", "formulation"), "--json"),
+    (line.split(), option)
+    for line, options in COMMANDS.items()
+    for option in options.split()
+    if line.split()[0] in every_command()
 ]
-OPTIONS = [each for each in OPTIONS if each[0][0] in every_command()]
 
 
 @pytest.fixture

@@ -14,7 +14,10 @@ from kincheck.core.options import whole
 from kincheck.core.report.terminal import columns, console
 
 from ..support.case_texts import at_hand, rows
+from ..support.examples import examples
 from ..support.fakes import Fake
+
+(UNDETERMINED,) = examples(__file__, "undetermined")
 
 RIGHT = Fake("native")
 
@@ -177,43 +180,6 @@ def test_verbose_and_history_tables_fit_console(
     assert out.count("0.0e+00 of ") == 12  # two outputs of two engines, three orders each
 
 
-UNDETERMINED = """
-schema = "kincheck-case/1"
-name = "two_hinges"
-source = "made up for this test"
-gravity = [0, 0, -9.81]
-
-[bodies.door]
-mass = 2.0
-center_of_mass = [0.5, 0, 0]
-
-[joints.upper]
-type = "revolute"
-bodies = ["ground", "door"]
-point = [0, 1, 0]
-axis = [0, 1, 0]
-
-[joints.lower]
-type = "revolute"
-bodies = ["ground", "door"]
-point = [0, 0, 0]
-axis = [0, 1, 0]
-
-[drivers.turn]
-type = "joint_angle"
-joint = "upper"
-
-[sweep]
-driver = "turn"
-start = 0
-stop = 1
-steps = 3
-
-[outputs.hinge]
-type = "joint_force"
-joint = "upper"
-component = "z"
-"""
 VARIED = """
 schema = "kincheck-vary/1"
 mode = "monte_carlo"

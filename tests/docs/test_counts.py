@@ -20,5 +20,5 @@ def test_counts_of_cases_in_pages():
     library = [kincheck.cases.load(name) for name in kincheck.cases.names()]
     closed = [case for case in library if case.truth is Truth.CLOSED_FORM]
     with_forces = [case for case in library if case.forces]
-    (found,) = SENTENCE.findall(PAGE.read_text(encoding="utf-8"))
+    (found,) = SENTENCE.findall(PAGE.read_text("utf-8"))
     assert [*map(int, found)] == [len(library), len(closed), len(with_forces)]

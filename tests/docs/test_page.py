@@ -7,38 +7,12 @@ from pathlib import Path
 import pytest
 from kincheck.core.cli import every_command
 
+from ..support.examples import examples
 from ..support.sources import ROOT
 from .builder import module
 from .page import blocks, commands, differences
 
-PAGE = """
-```toml title="a.toml"
-x = 1
-```
-
-<!-- status: 1 -->
-```console
-$ kincheck run a.toml
-1 fail
-$ ls
-a.toml
-```
-
-- a list
-
-  ```python
-  print(2)
-  ```
-
-  ```text
-  2
-  ```
-
-<!-- not run: takes hours -->
-```sh
-make fuzz
-```
-"""
+ALIKE, PAGE = examples(__file__, "alike", "page")
 
 
 def test_page_blocks_with_status_and_output():
@@ -55,14 +29,7 @@ PRINTED = "case  error\n\nrssr  1.5e-16  pass\nnote: long, and longer\n1 pass\n"
 
 @pytest.mark.parametrize(
     ("shown", "lacks"),
-    [
-        ("case error\nrssr 2e-9 pass", ""),
-        ("...\n1 pass", ""),
-        ("case error\n...\nnote: long ...\n7 pass", ""),
-        ("rssr 2e-9 pass", "rssr # pass"),
-        ("case error\nrssr 2e-9 fail", "rssr # fail"),
-        ("...\n1 pass\ncase error", "case error"),
-    ],
+    ALIKE,
 )
 def test_shown_output_may_differ_in_numbers(shown, lacks):
     assert differences(shown, PRINTED) == lacks

@@ -12,6 +12,7 @@ from kincheck.core.harness.run import run
 from kincheck.core.mechanism.motions import Waypoints
 from kincheck.core.report.report import headline
 
+from ..support.examples import examples
 from ..support.fakes import (
     RADIUS,
     SAMPLES,
@@ -25,6 +26,8 @@ from ..support.fakes import (
     run_case,
     solution,
 )
+
+(RESIDUALS,) = examples(__file__, "residuals")
 
 TOL = 1e-12
 ENDS = "cannot be followed beyond here: there is a singular pose ahead"
@@ -165,14 +168,8 @@ def test_residual_above_tolerance_fails():
 
 @pytest.mark.parametrize(
     ("residual", "options", "engine"),
-    [
-        (1e-6, {"tol": 1e-5}, {}),
-        (1e-12, {}, {}),
-        # a simulation promises no residual, and an effort leaves one on purpose
-        (1e-6, {}, {"mode": "simulate"}),
-        (1e-6, {"residuals": False}, {}),
-    ],
-    ids=["tolerance", "round-off", "simulation", "effort"],
+    RESIDUALS.values(),
+    ids=RESIDUALS,
 )
 def test_residual_within_tolerance_passes(residual, options, engine):
     given = {"tol": TOL, **options}

@@ -25,9 +25,12 @@ from kincheck.core.report.regressions import to_markdown
 from kincheck.core.report.report import caveats, headline, write_report
 from msgspec import UNSET
 
+from ..support.examples import examples
 from ..support.fakes import SAMPLES, Fake, crank, off, partial, record_of, run_case, solution
 from ..support.history_runs import changed, history, keep, records, report, reported
 from ..support.printed import junit_messages, junit_tests
+
+(NAMED,) = examples(__file__, "named")
 
 TOL = 1e-12
 RIGHT, MISSING = Fake("native"), Fake("missing", installed=None)
@@ -141,14 +144,7 @@ def test_unjudged_case_keeps_status_0(kincheck_main, capsys):
 
 @pytest.mark.parametrize(
     ("named", "status"),
-    [
-        ("", 0),
-        ("--engine native", 0),
-        ("--engine native missing", 2),
-        ("--engine missing", 2),
-        ("--engine native unable", 0),
-        ("--engine native missing --require missing", 2),  # said once
-    ],
+    NAMED,
 )
 def test_named_engine_is_required(kincheck_main, capsys, named, status):
     assert kincheck_main("run", *named.split(), engines=[RIGHT, MISSING, UNABLE]) == status

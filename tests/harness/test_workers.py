@@ -18,35 +18,17 @@ from kincheck.core.harness.run import run
 from kincheck.core.harness.workers.pool import in_workers
 
 from ..support.bad_engine import Bad, Elsewhere, Leaking, Unimportable
+from ..support.examples import examples
 from ..support.fake_command import Slow
 from ..support.fakes import Fake, crank, raising, record_of, run_case
+
+(EXPECTED,) = examples(__file__, "expected")
 
 ROOT = Path(__file__).parents[2]
 TOL = 1e-12
 # Long for a crank even on a busy machine, short for a test that waits for it.
 LIMITS = Limits(timeout=2.0, memory=1.0)
 PATIENT = Limits(timeout=60.0, memory=1.0)
-
-EXPECTED = {
-    "right": (Outcome.PASS, ""),
-    "segfault": (Outcome.CRASHED, "the process died of SIGSEGV in "),
-    "abort": (Outcome.CRASHED, "the process died of SIGABRT in "),
-    "system_exit": (Outcome.ERROR, "SystemExit: 0"),
-    "exit": (
-        Outcome.CRASHED,
-        "the process ended with status 3 before it had an answer; it last printed: solving exit",
-    ),
-    "deaf": (
-        Outcome.TIMEOUT,
-        "no answer within 2 s; the process was killed; it last printed: solving deaf",
-    ),
-    "memory": (Outcome.ERROR, "this process may have 1 GB"),
-    "shapes": (Outcome.ERROR, "position of point 'tip' has shape (8, 3), expected (9, 3)"),
-    "nan": (Outcome.ERROR, "velocity of point 'tip' is [nan, nan, nan] at sample 0"),
-    "weird": (Outcome.ERROR, "Weird: its text cannot be had (TypeError)"),
-    "lengthy": (Outcome.ERROR, "characters left out"),
-    "interrupt": (Outcome.ERROR, "KeyboardInterrupt"),
-}
 
 
 @pytest.fixture(autouse=True)

@@ -11,8 +11,11 @@ from kincheck.core.cli.main import main
 from kincheck.core.history.database import MIGRATIONS
 from kincheck.core.history.store import Store
 
+from ..support.examples import examples
 from ..support.fakes import crank
 from ..support.history_runs import history, nights, report
+
+(DAMAGE,) = examples(__file__, "damage")
 
 NO_TRENDS = "The history cannot be read, so this page shows no earlier runs."
 
@@ -143,22 +146,6 @@ def test_damaged_history_is_only_read(path, capsys, command):
         (count,) = store.connection.execute("SELECT count(*) FROM states").fetchone()
     assert path.read_bytes() != before
     assert count == 8
-
-
-DAMAGE = {
-    "circumstances": (
-        """UPDATE runs SET circumstances = replace(circumstances, '"kincheck":', '"kincheck"!') WHERE id = 2"""  # noqa: E501
-    ),
-    "plan": "UPDATE runs SET plan = replace(plan, '[', '(') WHERE id = 2",
-    "a byte of a run": "UPDATE runs SET command = cast(x'61ff62' as text) WHERE id = 2",
-    "a byte of an engine": (
-        "UPDATE records SET engine = cast(x'6e61ff697665' as text) WHERE run_id = 2 AND engine ="
-        " 'native'"
-    ),
-    "a byte of a message": "UPDATE records SET message = cast(x'61ff62' as text) WHERE run_id = 2",
-    "errors": "UPDATE records SET errors = substr(errors, 2) WHERE run_id = 2",
-    "an outcome": "UPDATE records SET outcome = 'pasd' WHERE run_id = 2",
-}
 
 
 @pytest.fixture(params=DAMAGE)

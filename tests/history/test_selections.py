@@ -5,8 +5,11 @@ from kincheck import Outcome
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.store import Store
 
+from ..support.examples import examples
 from ..support.fakes import Fake, crank, off
 from ..support.history_runs import changed, keep, records, reported, worse
+
+(AGAIN,) = examples(__file__, "again")
 
 # untimed: a busy machine is slower, which a report names too
 RIGHT = Fake("native", untimed=True)
@@ -78,14 +81,8 @@ def test_unlike_selection_breaks_nothing(run, report):
 @pytest.mark.by_day(2)
 @pytest.mark.parametrize(
     ("again", "status"),
-    [
-        ((*NIGHT, "--tol", "1e-6"), 1),
-        ((*NIGHT, "--engine", "native", "--junit", "junit.xml", "--quiet"), 0),
-        ((*OTHER, *NIGHT), 0),
-        ((*OTHER, *NIGHT, "--tol", "1e-6"), 1),
-        ((), 0),
-    ],
-    ids=["tolerance", "places", "more", "more and tolerance", "all"],
+    AGAIN.values(),
+    ids=AGAIN,
 )
 def test_same_selection_repairs_run(run, report, monkeypatch, tmp_path, again, status):
     monkeypatch.chdir(tmp_path)

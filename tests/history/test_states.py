@@ -12,6 +12,7 @@ from kincheck.core.harness.provenance import case_facts
 from kincheck.core.history.findings import Kind
 from msgspec.structs import replace
 
+from ..support.examples import examples
 from ..support.fakes import crank
 from ..support.history_runs import (
     FIRST,
@@ -27,6 +28,8 @@ from ..support.history_runs import (
     times,
     worse,
 )
+
+(WRONG,) = examples(__file__, "wrong")
 
 NIGHTS = 30
 
@@ -122,12 +125,7 @@ def test_accepted_step_is_told_once(path, capsys):
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [
-        (["--accept", "first:mujoco"], "--accept and --reason belong together"),
-        (["--reason", "so"], "--accept and --reason belong together"),
-        (["--accept", "frist:mujoco", "--reason", "so"], "did you mean 'first:mujoco'?"),
-        (["--accept", "first:mujoco", "--reason", "so"], "nothing to accept"),
-    ],
+    WRONG,
 )
 def test_wrong_acceptance_is_refused(path, capsys, words, said):
     nights(path, 2)

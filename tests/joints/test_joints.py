@@ -29,28 +29,16 @@ from kincheck.core.joints.base import direction, position
 from kincheck.core.primitives import Pose, Twist
 
 from ..oracles import naive
+from ..support.examples import examples
 from ..support.mechanisms import ORIGIN, X, Y, Z
+
+(EXAMPLES,) = examples(__file__, "examples")
 
 P, Q = (0.3, -0.2, 0.5), (0.9, 0.4, 0.1)
 AXIS = (1.0, 2.0, -0.5)
 SQUARE = ((1.0, 1.0, 0.0), (1.0, -1.0, 3.0))
 NAMES = ("joint", "first", "second")
 
-EXAMPLES = {
-    "constant_velocity": (P, ((1.0, 0.2, 0.0), (1.0, -0.3, 0.4))),
-    "distance": ((P, Q),),
-    "fixed": (P,),
-    "orientation_lock": (),
-    "parallel_axes": (AXIS,),
-    "perpendicular_axes": (SQUARE,),
-    "revolute_spherical": ((P, Q), AXIS),
-    "screw": (P, AXIS, 0.4),
-    "spherical": (P,),
-    "universal": (P, SQUARE),
-    **dict.fromkeys(
-        ("cylindrical", "in_plane", "inline", "planar", "revolute", "translational"), (P, AXIS)
-    ),
-}
 """Geometry by type, in the order of the fields."""
 
 

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from kincheck import MechanismError, Spline
 
+from ..support.examples import examples
 from ..support.splines import through
+
+(BAD_POINTS,) = examples(__file__, "bad_points")
 
 X = (-1.3, -0.6, -0.1, 0.0, 0.4, 0.9)
 Y = (-0.9, 0.7, -0.2, 0.0, 0.7, 0.8)
@@ -55,15 +58,7 @@ def test_spline_in_units_and_origin():
 
 @pytest.mark.parametrize(
     ("points", "message"),
-    [
-        ((), "found (), expected pairs"),
-        (((0.0, 1.0),), "expected pairs [[driving, driven], ...], from two"),
-        (((0.0, 1.0), (1.0, float("nan"))), "expected pairs"),
-        (((0.0, 1.0), (0.0, 2.0)), "0.0 follows 0.0; the first numbers must increase"),
-        (((0.0, 1.0, 2.0), (1.0, 2.0, 3.0)), "expected pairs"),
-        (((0.0, 0.0), (5e-324, 1.0), (1.0, 0.0)), "too close or too large for a spline"),
-        (((0.0, -1e308), (1.0, 1e308)), "too close or too large for a spline"),
-    ],
+    BAD_POINTS,
     ids=str,
 )
 def test_spline_of_bad_points_is_refused(points, message):

@@ -19,14 +19,13 @@ from kincheck.core.mechanism.loads import Bushing
 from kincheck.core.primitives import Pose
 
 from ..support.engine_motion import ENGINES, installed
+from ..support.examples import examples
 from ..support.loads import solved, traced
 from ..support.mechanisms import ORIGIN
 
+BUSHED, TORQUES, BAD_VALUES = examples(__file__, "bushed", "torques", "bad_values")
+
 ROTATION = np.array([0.08, -0.05, 0.12])
-TORQUES = {
-    "euler_parameters": (8.41809643, -9.72167752, 5.77711516),
-    "cardan": (8.28625694, -9.51133482, 5.70973763),
-}
 TABLE = ((-0.01, -200.0), (0.0, 0.0), (0.005, 10.0), (0.02, 1000.0))
 
 
@@ -141,16 +140,7 @@ def test_bushing_case_file_round_trip(tmp_path):
 
 @pytest.mark.parametrize(
     ("given", "expected"),
-    [
-        ("stiffness = -3000", "stiffness is -3000.0.*zero or more"),
-        ("stiffness = [1, 2]", "a number, or three along the axes"),
-        ("stiffness = 1\nlaw = 'chrono'", "euler_parameters, cardan"),
-        ("stiffness = 1\naxes = [[1, 0, 0], [1, 1, 0]]", "45 degrees apart, expected 90"),
-        ("curve = [[0, 0], [0, 1]]", "deflections must increase"),
-        ("curve = [[1, 5], [2, 9]]", "no force of it is zero"),
-        ("curve = [[0, 0], [1, 9, 4]]", "a table"),
-        ("damping = 0", "has no stiffness"),
-    ],
+    BAD_VALUES,
 )
 def test_bushing_with_bad_values_is_refused(tmp_path, given, expected):
     file = tmp_path / "bad.toml"
@@ -182,80 +172,3 @@ def test_writers_name_omitted_bushings_and_curves(tmp_path, target):
 
 
 AXES = "axes = [[0, 1, 0], [0, 0, 1]]\n"
-BUSHED = """\
-schema = "kincheck-case/1"
-name = "b"
-source = "made"
-gravity = [0.0, 0.0, -9.81]
-[units]
-length = "mm"
-[bodies.arm]
-mass = 2.0
-center_of_mass = [200, 0, 0]
-inertia = [1000, 20000, 20000, 0, 0, 0]
-[bodies.hand]
-mass = 1.0
-center_of_mass = [500, 0, 0]
-[joints.h]
-type = "revolute"
-bodies = ["ground", "arm"]
-point = [0, 0, 0]
-axis = [0, 1, 0]
-[joints.h.bushings.front]
-axes = [[0, 1, 0], [0, 0, 1]]
-stiffness = [1000, 2000, 3000]
-turning_stiffness = 1000
-[joints.g]
-type = "revolute"
-bodies = ["arm", "hand"]
-point = [400, 0, 0]
-axis = [0, 0.2, 1]
-[points.tip]
-body = "hand"
-position = [600, 0, 0]
-[drivers.d]
-type = "joint_angle"
-joint = "h"
-[drivers.e]
-type = "joint_angle"
-joint = "g"
-[drivers.e.motion]
-type = "sine"
-amplitude = 0.3
-frequency = 0.5
-[sweep]
-driver = "d"
-start = -0.3
-stop = 0.4
-steps = 8
-rate = 2.0
-[forces.b]
-type = "bushing"
-bodies = ["arm", "hand"]
-point = [450, 20, 10]
-axes = [[1, 1, 0], [0, 0, 1]]
-stiffness = [100, 200, 300]
-turning_stiffness = [10000, 20000, 40000]
-damping = [1, 2, 3]
-turning_damping = 500
-preload = [10, -5, 3]
-law = "LAW"
-curve = [[], [[-10, -200], [0, 0], [5, 10], [20, 1000]], []]
-[forces.s]
-type = "spring_damper"
-bodies = ["hand", "ground"]
-points = [[550, 0, 0], [600, 0, 300]]
-curve = [[-50, -300], [0, 0], [50, 100], [80, 900]]
-[outputs.M]
-type = "driver_effort"
-driver = "d"
-[outputs.N]
-type = "driver_effort"
-driver = "e"
-[outputs.B]
-type = "element_force"
-force = "b"
-[outputs.S]
-type = "element_force"
-force = "s"
-"""

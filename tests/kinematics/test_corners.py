@@ -19,7 +19,10 @@ from kincheck import (
 )
 from kincheck.core.kinematics import styles
 
+from ..support.examples import examples
 from ..support.mechanisms import ORIGIN, X, Z, circles_meet, planar_four_bar, solve_all
+
+(NEARLY_KITES,) = examples(__file__, "nearly_kites")
 
 ROD = 0.8
 
@@ -171,50 +174,6 @@ def test_gap_verdict_ignores_wanted_points():
 
 
 # and nearly parallelograms: pin, end of the rod, rest of the rocker, last turn, samples
-NEARLY_KITES = {
-    "kite": (
-        (0.4260866094025061, 0.09610141632702796),
-        (0.05330114251731225, 0.32373794595045846),
-        1.0098026454771485,
-        -5.6167,
-        73,
-    ),
-    "kite that folds": (
-        (-0.9963803731629649, -0.5891443362735412),
-        (0.061853652076719, 0.016510422670654),
-        1.2192612306465147,
-        4.1357,
-        25,
-    ),
-    "never locks": (
-        (0.9697033471070498, -0.3443453141456345),
-        (0.6073751573486417, -1.3075254632217728),
-        1.7110737849494355,
-        -6.2769,
-        19,
-    ),
-    "locks": (
-        (0.407187255644269, -0.06317054565251659),
-        (1.4280674729874876, -0.0631734360870428),
-        1.0208806657722926,
-        3.2062,
-        13,
-    ),
-    "turns unseen": (
-        (-0.8114361531517722, 0.4497902962488659),
-        (0.11192415924912638, 0.5400567995235857),
-        1.3589039496745472,
-        3.4404473351597655,
-        7,
-    ),
-    "twisted": (
-        (0.6286049409194256, -0.008145844979201),
-        (2.1516027678897336, -0.008643655436957),
-        1.5230044750512732,
-        -4.8815,
-        7,
-    ),
-}
 
 
 def side_of_the_line(pin, rest, turn, found):

@@ -23,7 +23,10 @@ from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.structure.degrees_of_freedom import DENSE, account
 
 from ..support.case_texts import write
+from ..support.examples import examples
 from ..support.mechanisms import ORIGIN, X, Z, chain, slider_crank
+
+(MISMATCHES,) = examples(__file__, "mismatches")
 
 LOOPS = 14  # 29 bodies
 WELDED = DENSE + 1
@@ -133,18 +136,7 @@ def written(mechanism, drivers):
 
 @pytest.mark.parametrize(
     ("loops", "drivers", "left_out", "status", "said"),
-    [
-        (LOOPS, {"turn": "pivot0"}, "", 2, "nothing was compared (1 not judged)"),
-        (LOOPS, {"turn": "pivot0", "second": "pivot9"}, "", 2,
-         "1 degree of freedom (174 coordinates - rank 173) but 2 drivers"),
-        (LOOPS, {"turn": "pivot0"}, f"cross{LOOPS - 1}", 2,
-         f"what can still move is most of all 'coupler{LOOPS - 1}', 'cr"),
-        (2, {"turn": "pivot0", "second": "pivot1"}, "", 2,
-         "1 degree of freedom (30 coordinates - rank 29) but 2 drivers"),
-        (2, {"turn": "pivot0"}, "cross1", 2,
-         "but 1 driver; 'crank2' can turn, 'coupler1' can turn; add a driver"),
-    ],
-    ids=["large", "large, overdriven", "large, loose", "small, overdriven", "small, loose"],
+    MISMATCHES.values(), ids=MISMATCHES,
 )  # fmt: skip
 def test_driver_mismatch_exit_status_and_message(
     loops, drivers, left_out, status, said, tmp_path, capsys

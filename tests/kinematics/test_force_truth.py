@@ -31,8 +31,8 @@ from ..support.loads import GRAVITY, six
 from ..support.mechanisms import ORIGIN, X, Z
 
 DATA = Path(__file__).parents[1] / "data"
-REACTIONS = json.loads((DATA / "adams_joint_reactions.json").read_text(encoding="utf-8"))["cases"]
-ANDREWS = json.loads((DATA / "andrews_squeezer.json").read_text(encoding="utf-8"))
+REACTIONS = json.loads((DATA / "adams_joint_reactions.json").read_text("utf-8"))["cases"]
+ANDREWS = json.loads((DATA / "andrews_squeezer.json").read_text("utf-8"))
 
 
 # ADAMS

@@ -93,7 +93,7 @@ def test_case_in_other_units(name, swept, tmp_path):
     radians.
     """
     file = Path(__file__).parents[2] / "cases" / f"{name}.toml"
-    tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    tables = tomllib.loads(file.read_text("utf-8"))
     for entry in (
         each
         for table in ("bodies", "joints", "points", "outputs")

@@ -31,6 +31,7 @@ from kincheck.core.kinematics.compiled.request import RATE, RATE_T, Request
 from kincheck.core.trajectory import Motions
 
 from ..oracles import naive
+from ..support.examples import examples
 from ..support.mechanisms import (
     ORIGIN,
     Y,
@@ -43,6 +44,7 @@ from ..support.mechanisms import (
     without_fixed_bodies,
 )
 
+(BAD_ARGUMENTS,) = examples(__file__, "bad_arguments")
 STROKES = np.linspace(-0.08, 0.08, 161)
 MOVING = ("lca", "knuckle", "strut")
 
@@ -311,23 +313,10 @@ def test_solve_without_samples(name):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"driver": "steer"}, "there is no driver 'steer'; known: stroke"),
-        ({"points": ["hub"]}, "there is no point 'hub'; known: rod_end, wheel"),
-        ({"bodies": ["hub"]}, "there is no body 'hub'; known: "),
-        ({"order": 3}, "order is 3, expected 0, 1 or 2"),
-        ({"rate": 0.0}, "rate is 0.0, expected driver units"),
-        ({"tol": np.nan}, "tol is nan, expected a positive number"),
-        ({"tol": np.inf}, "tol is inf"),
-        ({"values": 0.1}, r"values have shape \(\), expected \(n,\)"),
-        ({"values": [[0.0, 0.1]]}, r"values have shape \(1, 2\)"),
-        ({"values": [0.0, np.nan]}, "values are not all finite"),
-        ({"values": ["a"]}, r"values are \['a'\], expected numbers"),
+        *BAD_ARGUMENTS,
         ({"values": [1j]}, r"values are \[1j\], expected numbers"),
-        ({"rate": 1e-320}, "rate is 1e-320: no number is the time of the values then"),
         ({"motions": {"stroke": Ramp(1.0)}}, "motions has 'stroke', which is swept; leave it out"),
         ({"motions": {"steer": Ramp(1.0)}}, "there is no driver 'steer'"),
-        ({"motions": {"steer": 3.0}}, r"motions\['steer'\] is 3.0, expected a motion"),
-        ({"style": "dads"}, "there is no style 'dads'; known: native, mixed"),
     ],
     ids=str,
 )

@@ -25,6 +25,7 @@ from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.kinematics.continuation.walk import FINER, ROOM, SideWalk
 from kincheck.core.mechanism.motions import Path
 
+from ..support.examples import examples
 from ..support.mechanisms import (
     CRANK,
     ORIGIN,
@@ -41,6 +42,8 @@ from ..support.mechanisms import (
     slider_crank_motion,
     solve_all,
 )
+
+(FEW,) = examples(__file__, "few")
 
 STROKES = np.linspace(-0.08, 0.08, 33)
 
@@ -63,15 +66,7 @@ def test_samples_in_any_order():
 
 @pytest.mark.parametrize(
     "values",
-    [
-        [0.0],
-        [0.05],
-        [-0.08],
-        [0.05, 0.08],
-        [-0.08, -0.03],
-        [0.08, -0.08],
-        [0.02, 0.02, -0.02, 0.02],
-    ],
+    FEW,
     ids=str,
 )
 def test_few_samples(values):

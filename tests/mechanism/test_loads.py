@@ -14,7 +14,10 @@ from kincheck.core.mechanism.loads import (
     TorsionSpringDamper,
 )
 
+from ..support.examples import examples
 from ..support.mechanisms import ORIGIN, X, Z
+
+(BAD_MASSES,) = examples(__file__, "bad_masses")
 
 BALL = (2.0, 2.0, 2.0, 0.0, 0.0, 0.0)
 APART = (ORIGIN, (0.0, 3.0, 4.0))
@@ -39,20 +42,7 @@ def test_inertia_matrix_of_six_numbers():
 
 @pytest.mark.parametrize(
     ("values", "message"),
-    [
-        ({"mass": -1.0}, "mass is -1.0, expected a number of kg, zero or more"),
-        ({"mass": float("nan")}, "mass is nan"),
-        ({"mass": "1"}, "mass is '1'"),
-        ({"mass": 1.0, "center_of_mass": (0.0, 0.0)}, "center_of_mass"),
-        ({"mass": 1.0, "center_of_mass": (0.0, 0.0, float("inf"))}, "is not finite"),
-        ({"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}, "Ixx, Iyy, Izz, Ixy, Iyz, Ixz"),
-        ({"mass": 1.0, "inertia": (1.0, 1.0, -1.0, 0.0, 0.0, 0.0)}, "not positive definite"),
-        # each diagonal entry is positive; the matrix is not
-        ({"mass": 1.0, "inertia": (1.0, 1.0, 1.0, 1.2, 0.0, 0.0)}, "not positive definite"),
-        ({"mass": 1.0, "inertia": (1.0, 1.0, 0.0, 0.0, 0.0, 0.0)}, "leave inertia out for a point"),
-        ({"mass": 1.0, "inertia": (1.0, 1.0, 2.1, 0.0, 0.0, 0.0)}, "triangle inequality"),
-        ({"inertia": BALL}, "has an inertia, but no mass"),
-    ],
+    BAD_MASSES,
     ids=str,
 )
 def test_impossible_mass_is_refused(values, message):

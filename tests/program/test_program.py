@@ -14,7 +14,10 @@ from hypothesis import strategies as st
 from kincheck.core.algebra import root
 from kincheck.core.program import Tape, absolute, maximum, minimum, program, where_larger
 
+from ..support.examples import examples
 from ..support.program_blocks import numpy_executor, run_on
+
+(FOLDS,) = examples(__file__, "folds")
 
 INPUTS = 4
 
@@ -133,36 +136,6 @@ def test_traced_random_expressions_are_exact(wanted, samples):
 
 
 # Folding, one rule at a time
-
-FOLDS = {
-    "x + 0.0": "x",
-    "0.0 + x": "x",
-    "x - 0.0": "x",
-    "0.0 - x": "-x",
-    "x - x": "0.0",
-    "0.0 * x": "0.0",
-    "x * 0": "0.0",
-    "1.0 * x": "x",
-    "x * -1.0": "-x",
-    "0.0 / x": "0.0",
-    "x / 1.0": "x",
-    "x / -1.0": "-x",
-    "-(-x)": "x",
-    "x + (-y)": "x - y",
-    "(-x) + y": "y - x",
-    "x - (-y)": "x + y",
-    "(-x) - y": "-(x + y)",
-    "x + (-2.0)": "x - 2.0",
-    "(-x) * y": "-(x * y)",
-    "(-x) * (-y)": "x * y",
-    "(-x) / (-y)": "x / y",
-    "-2.0 * x": "-(2.0 * x)",
-    "y + x": "x + y",
-    "y * x": "x * y",
-    "minimum(x, x)": "x",
-    "where_larger(x, y, x, x)": "x",
-    "where_larger(2.0, -3.0, x, y)": "y",
-}
 
 
 @pytest.mark.parametrize("rule", FOLDS)

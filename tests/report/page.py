@@ -79,7 +79,7 @@ def report(run, folder):
     path = folder / "report.html"
     write_report(run, path)
     assert path.stat().st_size < 8_000_000
-    return Page(path.read_text(encoding="utf-8"))
+    return Page(path.read_text("utf-8"))
 
 
 def traces(page, figure, name, mode):

@@ -11,8 +11,11 @@ from kincheck.core.harness.record import Explanation, Suspect
 from kincheck.core.history.findings import Change, Finding, Kind, Loose, Regressions, RunName, Step
 from kincheck.core.report import junit, regressions, report, table
 
+from ..support.examples import examples
 from ..support.planted import as_json, missing, on_terminal, text_of_page, unexplained, unfilled
 from ..support.strut_results import results
+
+OF_RUN, OF_REPORT = examples(__file__, "of_run", "of_report")
 
 replace = msgspec.structs.replace
 
@@ -96,30 +99,6 @@ def page_of_run(result, tmp_path):
     return text_of_page(file.read_text("utf-8"))
 
 
-OF_RUN = [
-    ("schema", "terminal junit page", "for programs"),
-    (r"run\.(kincheck|tol|engines|cases\.source).*", "terminal junit", "of all records: the page"),
-    (r"run\.cases\.driver\..*", "terminal junit page", "the description of the case"),
-    (r".*\.truth", "junit", "each error names its standard"),
-    (r".*\.(driver|details|settings|table)\..*", "terminal junit page", "curves and programs"),
-    (
-        r"(.*\.outputs|references)\.(position|velocity|acceleration|unit)",
-        "terminal junit",
-        "curves",
-    ),
-    (r".*\.outputs\.sense", "page", "once for each case"),
-    (r".*\.(faults|errors\.(lost|contradicted))", "terminal junit page", "in the message"),
-    (r".*\.seconds\.(compare|waited)", "page", "the time of a sample is without them"),
-    (r"(.*\.outputs|references)\.reason", "terminal junit page", "in the reason of its errors"),
-    (r".*\.errors\.\w+\.rms", "terminal page", "the largest error judges"),
-    (r".*\.errors\.\w+\.(worst_step|against)", "terminal", "in the message of what fails"),
-    (r".*\.evidence\.sha256", "terminal junit", "its first digits"),
-    (r"records\.<one>\.(truth|evidence\..*)", "page", "once for each case"),
-    (r"suspects\.(?!message).*", "terminal junit page", "in the message"),
-    (r"records\.<(two|three|four)>\.(?!message).*", "terminal junit page", "solved nothing"),
-]
-
-
 def test_run_reaches_every_form(tmp_path):
     forms = {
         "terminal": on_terminal(table.print_outputs),
@@ -182,18 +161,6 @@ def a_change():
         steps=[step, over],
         loose=[Loose(case="strut", output="x", runs=4, largest=2e-3, factor=500.0, why="old")],
     )
-
-
-OF_REPORT = [
-    ("schema|pairs|time_limit|loose.largest", "terminal markdown junit page", "for programs"),
-    (r"(run|against)\.(number|started|host)", "terminal markdown junit page", "its name"),
-    (r".*\.started", "terminal markdown page", "to the minute"),
-    ("reason|unable", "terminal markdown junit page", "where there is nothing to compare with"),
-    (r"(failing|unjudged)", "terminal markdown junit page", "their number"),
-    (r"findings\..*(output|motion)", "terminal markdown page", "in the message"),
-    (r"findings\..*(motion|since|mode|case|engine)", "junit", "of its test"),
-    (r"(run|against|changes|steps|loose|passed_by).*", "junit", "changes of runs, not of tests"),
-]
 
 
 def test_report_reaches_every_form():

@@ -4,6 +4,10 @@ import pytest
 from kincheck.core.errors import number_of, with_article
 from kincheck.core.harness.labels import number, output_label
 
+from ..support.examples import examples
+
+(NOUNS,) = examples(__file__, "nouns")
+
 
 def test_output_labels():
     assert output_label("half_track_change") == "half-track change"
@@ -30,13 +34,7 @@ def test_number_text(value, text):
 
 @pytest.mark.parametrize(
     ("noun", "text"),
-    [
-        ("joint", "a joint"),
-        ("output", "an output"),
-        ("ForceElement", "a ForceElement"),
-        ("universal joint", "a universal joint"),
-        ("unknown joint", "an unknown joint"),
-    ],
+    NOUNS,
 )
 def test_noun_with_article(noun, text):
     assert with_article(noun) == text

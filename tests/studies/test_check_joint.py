@@ -38,22 +38,17 @@ from kincheck.core.harness.results_file import read_results
 from kincheck.core.joints import AxialJoint
 from kincheck.core.studies.checks.findings import Verdict
 
+from ..support.examples import examples
 from ..support.fakes import Fake, native_but
 from ..support.joint_mutants import mutants
 from .test_check_joint_mistakes import mistaken
+
+UNKNOWN, USERS = examples(__file__, "unknown", "users")
 
 JOINTS = Path(__file__).parents[1] / "user_joints"
 BUILT_IN = sorted(
     name for name, joint in Joint.registry.items() if joint.__module__.startswith("kincheck.")
 )
-USERS = {
-    "bowl": "Bowl",
-    "pin_in_slot": "PinInSlot",
-    "rzeppa": "Rzeppa",
-    "point_on_parabola": "PointOnParabola",
-    "line_no_twist": "LineNoTwist",
-    "torus": "Torus",  # the first loops lock up
-}
 WITHOUT_EQUIVALENT = ("bowl", "point_on_parabola", "line_no_twist", "torus")
 
 
@@ -322,9 +317,9 @@ def test_check_joint_command_prints_and_saves(few, in_folder, capsys):
 
 
 def test_check_joint_command_reports_failure(loops_only, monkeypatch, capsys, tmp_path):
-    text = (JOINTS / "pin_in_slot.py").read_text(encoding="utf-8")
+    text = (JOINTS / "pin_in_slot.py").read_text("utf-8")
     text = text.replace('("slide", "turn")', '("slide",)')
-    (tmp_path / "faulty_joint.py").write_text(text, encoding="utf-8")
+    (tmp_path / "faulty_joint.py").write_text(text, "utf-8")
     monkeypatch.chdir(tmp_path)
     assert main(["check-joint", "faulty_joint:PinInSlot"]) == 1
     said = capsys.readouterr().out
@@ -336,19 +331,7 @@ def test_check_joint_command_reports_failure(loops_only, monkeypatch, capsys, tm
 
 @pytest.mark.parametrize(
     ("where", "message"),
-    [
-        ("no_such_module:Joint", "no module 'no_such_module'"),
-        ("rzeppa", "write MODULE:CLASS"),
-        ("rzeppa:Rzepa", "did you mean 'Rzeppa'"),
-        ("rzeppa:Nothing", "its joints: Rzeppa"),
-        ("rzeppa:np", "is no joint type"),
-        ("kincheck.core:Revolut", "did you mean 'Revolute'?"),
-        (
-            "kincheck.core:Xyz",
-            "its joints: ConstantVelocity, Cylindrical, Distance, Fixed, InPlane, Inline, ",
-        ),
-        (".rzeppa:Rzeppa", "module '.rzeppa' cannot be imported: TypeError: "),
-    ],
+    UNKNOWN,
 )
 def test_unknown_joint_module_or_class_refused(in_folder, capsys, where, message):
     assert main(["check-joint", where]) == 2
@@ -386,8 +369,8 @@ REFUSED = (
 )  # fmt: skip
 def test_failing_joint_module_reports_its_line(tmp_path, monkeypatch, capsys, text, said):
     file, too = tmp_path / "broken_joint.py", tmp_path / "broken_too.py"
-    file.write_text(text, encoding="utf-8")
-    too.write_text("y = 1\nx = (\n", encoding="utf-8")
+    file.write_text(text, "utf-8")
+    too.write_text("y = 1\nx = (\n", "utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     assert main(["check-joint", "broken_joint:Own"]) == 2
     (line,) = capsys.readouterr().err.splitlines()

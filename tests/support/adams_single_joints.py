@@ -17,7 +17,7 @@ from kincheck import (
 from ..oracles import naive
 
 CASES = json.loads(
-    (Path(__file__).parents[1] / "data" / "adams_single_joints.json").read_text(encoding="utf-8")
+    (Path(__file__).parents[1] / "data" / "adams_single_joints.json").read_text("utf-8")
 )["cases"]
 NAMES = ("joint", "ground", "body")
 

@@ -10,36 +10,10 @@ from kincheck.core.case.models.files import load
 from kincheck.core.cli.lists import schema_of
 from kincheck.core.errors import OpenError
 
-BASE = """
-schema = "kincheck-case/1"
-name = "slider"
-source = "made up for this test"
-truth = "closed_form"
-[bodies.slider]
-origin = [1.0, 2.0, 3.0]
-[joints.guide]
-type = "translational"
-bodies = ["ground", "slider"]
-point = [1.0, 2.0, 3.0]
-axis = [1.0, 0.0, 0.0]
-[points.tip]
-body = "slider"
-position = [1.5, 2.0, 3.0]
-[drivers.push]
-type = "joint_displacement"
-joint = "guide"
-[sweep]
-driver = "push"
-start = -0.1
-stop = 0.1
-steps = 3
-rate = 2.0
-[outputs.tip_x]
-point = "tip"
-component = "x"
-atol = 1e-9
-why = "made up for this test"
-"""
+from ..support.examples import examples
+
+(BASE,) = examples(__file__, "base")
+
 
 INLINE = """
 [reference]

@@ -64,7 +64,7 @@ def _exudyn(texts, mechanism, folder, values):
     exu = importlib.import_module("exudyn")
     exu.config.printToConsole = False
     script = folder / "model.py"
-    script.write_text(texts[".py"], encoding="utf-8")
+    script.write_text(texts[".py"], "utf-8")
     model = runpy.run_path(str(script))
     mbs = model["mbs"]
     settings = exu.SimulationSettings()
@@ -248,7 +248,7 @@ def _osim(texts, mechanism, folder, values):
     o = importlib.import_module("opensim")
     o.Logger.setLevelString("Off")
     file = folder / "model.osim"
-    file.write_text(texts[".osim"], encoding="utf-8")
+    file.write_text(texts[".osim"], "utf-8")
     model = o.Model(str(file))
     state = model.initSystem()
     for each in model.getCoordinateSet():

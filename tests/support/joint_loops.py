@@ -6,25 +6,15 @@ import numpy as np
 from kincheck import GROUND, Body, Distance, Joint, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core import joints as library
 
+from ..support.examples import examples
+
+RODS, OTHER_RODS, GEOMETRY = examples(__file__, "rods", "other_rods", "geometry")
+
 HINGE = (0.2, -0.1, 0.3)
 CRANK = Revolute("crank", GROUND, "A", (0.0, 0.1, -0.1), (0.3, -0.2, 2.0))
 
 # both sets chosen so that the joints they go with stay far from singular positions: the largest
 # singular value is at most 30 times the smallest
-RODS = (
-    ((0.9, -0.8, 1.3), (0.2, -0.1, 0.6)),
-    ((0.6, 0.6, -0.6), (0.7, 0.0, 0.4)),
-    ((0.5, -0.5, -0.7), (0.2, 0.1, 0.3)),
-    ((1.1, -0.4, -0.3), (0.6, 0.3, 0.5)),
-    ((0.2, 0.6, 1.1), (0.7, -0.2, 0.4)),
-)
-OTHER_RODS = (
-    ((1.2, -0.2, -1.3), (0.5, 0.1, 0.1)),
-    ((-0.4, -1.1, 1.5), (0.3, -0.3, 0.4)),
-    ((1.5, 0.0, 1.0), (0.1, 0.3, 0.7)),
-    ((0.8, 0.6, -0.8), (0.8, -0.1, 0.5)),
-    ((1.0, 0.3, 1.2), (0.3, -0.3, 0.0)),
-)
 WITH_OTHER_RODS = {
     "inline",
     "orientation_lock",
@@ -36,24 +26,6 @@ ON_AXIS = {"point": HINGE, "axis": (0.4, 1.0, -0.7)}
 ENDS = {"points": (HINGE, (0.35, 0.0, 0.4))}
 # the axes of a cross, off the right angle by what rounding of a table may be
 ROUNDED = {"axes": ((0.5, 1.0, 0.2), (1.0, -0.49, 0.0))}
-GEOMETRY = {
-    "constant_velocity": {"point": HINGE, "axes": ((1.0, 0.2, 0.0), (1.0, -0.3, 0.4))},
-    "cylindrical": ON_AXIS,
-    "distance": ENDS,
-    "fixed": {},
-    "in_plane": ON_AXIS,
-    "inline": ON_AXIS,
-    "orientation_lock": {},
-    "parallel_axes": {"axis": ON_AXIS["axis"]},
-    "perpendicular_axes": ROUNDED,
-    "planar": ON_AXIS,
-    "revolute": ON_AXIS,
-    "revolute_spherical": ENDS | {"axis": ON_AXIS["axis"]},
-    "screw": ON_AXIS | {"lead": 0.4},
-    "spherical": {"point": HINGE},
-    "translational": ON_AXIS,
-    "universal": {"point": HINGE} | ROUNDED,
-}
 TYPES = sorted(
     name for name, kind in Joint.registry.items() if kind.__module__.startswith(library.__name__)
 )

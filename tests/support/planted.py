@@ -173,13 +173,13 @@ def as_json(result):
 def unexplained(found, exempt):
     """Places that a form lacks without a reason, and reasons that no form needs any more."""
     lacking = {(place, form) for place, forms in found.items() for form in forms}
-    excused = {
-        each: {
+    excused = [
+        {
             (place, form)
             for place, form in lacking
-            if re.fullmatch(each[0], place) and form in each[1].split()
+            if re.fullmatch(of, place) and form in forms.split()
         }
-        for each in exempt
-    }
-    needless = [each for each, pairs in excused.items() if not pairs]
-    return sorted(lacking.difference(*excused.values())), needless
+        for of, forms, *_ in exempt
+    ]
+    needless = [each for each, pairs in zip(exempt, excused, strict=True) if not pairs]
+    return sorted(lacking.difference(*excused)), needless

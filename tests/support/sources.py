@@ -26,7 +26,7 @@ TESTS = files("tests")
 
 @cache
 def tree(path):
-    return ast.parse((ROOT / path).read_text(encoding="utf-8"))
+    return ast.parse((ROOT / path).read_text("utf-8"))
 
 
 def statements(node):
@@ -86,7 +86,7 @@ def folder_of(path):
 
 
 EXTENSIONS = frozenset(
-    path.parent for path in SOURCES if "\nEXTENSION = " in (ROOT / path).read_text(encoding="utf-8")
+    path.parent for path in SOURCES if "\nEXTENSION = " in (ROOT / path).read_text("utf-8")
 )
 """Folders of extensions."""
 DELETED = "KINCHECK_DELETED"

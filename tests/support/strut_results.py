@@ -10,12 +10,10 @@ import msgspec
 from kincheck import Outcome, Record, Results
 from kincheck.core.harness.record import Deviation, Deviations, Evidence, OutputSeries, Seconds
 
-STROKE = {
-    "name": "stroke",
-    "type": "point_coordinate",
-    "point": "wheel_center",
-    "direction": [0.0, 0.0, 1.0],
-}
+from ..support.examples import examples
+
+ACCOUNT, STROKE = examples(__file__, "account", "stroke")
+
 CRANK = {"name": "crank", "type": "joint_angle", "joint": "pivot"}
 
 
@@ -91,17 +89,6 @@ def record(case, truth, engine, error, grid, **changes):
 
 
 GRID = [0.01 * k - 0.1 for k in range(21)]
-ACCOUNT = {
-    "bodies": 5,
-    "coordinates": 35,
-    "equations": 34,
-    "paper": "35 - 34 = 1",
-    "moving_coordinates": 18,
-    "rows": 17,
-    "rank": 17,
-    "dof": 1,
-    "redundant_rows": [],
-}
 
 
 def results(truth="in_house_oracle", case="strut", driver=STROKE):

@@ -10,7 +10,7 @@ GRID = 4.0 * np.finfo(float).eps
 def written_again(case, folder):
     """Return the case that is read from what is written; it has the same parts."""
     file = folder / "written_again.toml"
-    file.write_text(case_text(case), encoding="utf-8")
+    file.write_text(case_text(case), "utf-8")
     again = load_case(file)
     assert again.name == case.name
     assert again.mechanism == case.mechanism

@@ -38,6 +38,7 @@ from ...support.block_structures import (
     solve_components,
     with_one_program,
 )
+from ...support.examples import examples
 from ...support.mechanisms import (
     LEAN,
     ORIGIN,
@@ -50,6 +51,8 @@ from ...support.mechanisms import (
     placed,
     solve_all,
 )
+
+(COMPONENTS,) = examples(__file__, "components")
 
 
 def test_singular_pose_before_sweep_is_reported():
@@ -202,9 +205,7 @@ def test_walk_stops_before_doubtful_samples():
         assert lanes.walk(lanes.sample_tables(times, PATH), LANES)[1].shape[1] == followed
 
 
-@pytest.mark.parametrize(
-    ("part", "compiled"), [(0, True), (1, False), (1, True), (2, True), (3, False), (3, True)]
-)
+@pytest.mark.parametrize(("part", "compiled"), COMPONENTS)
 def test_sample_takes_worst_component(part, compiled):
     """The first, which is driven, any of those that are alike, and the last; what is not a number
     is the worst of all.

@@ -39,6 +39,7 @@ from kincheck.core.kinematics.structure.degrees_of_freedom import NullSpaces
 from kincheck.core.mechanism.motions import Path
 
 from ...support.block_structures import chain_of_hinges, solve_sparse
+from ...support.examples import examples
 from ...support.fakes import calls
 from ...support.mechanisms import (
     ORIGIN,
@@ -53,6 +54,8 @@ from ...support.mechanisms import (
     planar_four_bar,
     solve_all,
 )
+
+SHAPES, GAPS, EXCHANGED, RINGS = examples(__file__, "shapes", "gaps", "exchanged", "rings")
 
 CRANKS = 5
 """A small ring is solved as one sparse system on request; the front door does so from 40 bodies."""
@@ -84,20 +87,12 @@ def four_bar(sizes, start, ends, cranks=CRANKS):
 
 
 KITE = (1.25, 1.2, 0.7, 0.7)
-SHAPES = {"plain": (0.5, 1.5, 1.3, 1.2), "kite": KITE, "aside": (1.0, 1.2, 1.000001, 1.2)}
 """Lengths of crank, ground, rod and rocker."""
 
 
 @pytest.mark.parametrize(
     ("count", "shape", "ends"),
-    [
-        (9, "plain", "hinges"),
-        (9, "plain", "universals"),
-        (9, "kite", "hinges"),
-        (9, "aside", "universals"),
-        (65, "kite", "universals"),
-        (65, "aside", "hinges"),
-    ],
+    EXCHANGED,
 )
 def test_sparse_rows_are_exchanged(shape, ends, count):
     """A plain four-bar, a kite off by a twentieth, and one on its side beside its corner."""
@@ -179,13 +174,7 @@ def test_parallelogram_in_line_goes_on(ends, grid):
 @pytest.mark.by_day(3)
 @pytest.mark.parametrize(
     "shape",
-    [
-        ("coarse", "hinges", 1e-6, 0.57053),
-        ("middle", "distance", 1e-6, 0.57053),
-        ("fine", "hinges", 1e-6, 0.57053),
-        ("coarse", "distance", 1e-4, 0.56846),
-        ("middle", "hinges", 1e-4, 0.56846),
-    ],
+    GAPS,
     ids=str,
 )
 def test_sparse_gap_ends_motion(shape):
@@ -382,9 +371,7 @@ def test_slopes_fall_lane_by_lane():
         np.testing.assert_array_equal(after[:, k], slope)
 
 
-@pytest.mark.parametrize(
-    ("cranks", "turns", "count"), [(9, 1, 2), (9, -4, 11), (22, -2, 2), (22, 1, 11)]
-)
+@pytest.mark.parametrize(("cranks", "turns", "count"), RINGS)
 def test_ring_counts_turns_between_samples(cranks, turns, count):
     """A nut beside a ring, whose lead tells the turns: as one program, and as a sparse system."""
     whole, lead, last = ring(cranks), 0.01, 0.01

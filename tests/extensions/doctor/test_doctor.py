@@ -15,6 +15,10 @@ from kincheck.core.cli.main import main
 from kincheck.core.extensions.doctor import installation
 from kincheck.core.program import disk_cache
 
+from ...support.examples import examples
+
+OTHERS, BROKEN = examples(__file__, "others", "broken")
+
 
 @pytest.fixture
 def without_imports(monkeypatch):
@@ -84,10 +88,6 @@ def test_doctor_names_version_too_old(version, sound, without_imports, monkeypat
 
 
 # Slow to import, and none takes part.
-OTHERS = (
-    *("mujoco", "pinocchio", "exudyn", "pydrake", "dartpy", "opensim"),
-    *("pandas", "xarray", "matplotlib", "distributed", "pyarrow", "openpyxl"),
-)
 
 
 def test_doctor_with_broken_llvmlite_uses_numpy(tmp_path):
@@ -136,16 +136,7 @@ def imported(name, code):
 
 @pytest.mark.parametrize(
     ("code", "said", "remedy"),
-    [
-        ("os; os.abort()", "the process ended with status", "pip install --force-reinstall numpy"),
-        ("no_such_module", "No module named 'no_such", "pip install --force-reinstall numpy"),
-        ("time; time.sleep(60)", "takes more than", "pip install --force-reinstall numpy"),
-        (
-            "ctypes; ctypes.CDLL('libnothing.so.7')",
-            "libnothing.so.7",
-            "install the system's package with libnothing.so.7 (of Debian: ",
-        ),
-    ],
+    BROKEN,
 )
 def test_doctor_finds_broken_library(code, said, remedy, monkeypatch):
     monkeypatch.setattr(installation, "PATIENCE", 5.0 if "sleep" not in code else 0.5)

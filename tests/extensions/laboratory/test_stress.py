@@ -81,7 +81,7 @@ def test_stress_specimens_repeat_and_save(name, tmp_path):
         assert case.mechanism == again.case.mechanism
         assert np.ptp(case.sweep.path.values(case.sweep.path.times), axis=1).max() > 0.0
         file = tmp_path / f"{number}.toml"
-        file.write_text(case_text(case, ["a comment"]), encoding="utf-8")
+        file.write_text(case_text(case, ["a comment"]), "utf-8")
         read = load_case(file)
         assert (read.mechanism, read.outputs) == (case.mechanism, case.outputs)
         assert (read.sweep.motions, read.sweep.rate) == (case.sweep.motions, case.sweep.rate)

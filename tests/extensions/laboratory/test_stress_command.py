@@ -61,8 +61,8 @@ def test_stress_writes_tables_and_data(tmp_path, capsys):
     assert found["findings"] == []
     assert "None of" in err
     assert {file.name for file in new.iterdir()} == {"stress.json", "stress.html", "stress.md"}
-    assert "| units | native projection |" in (new / "stress.md").read_text(encoding="utf-8")
-    assert "silently wrong" in (new / "stress.html").read_text(encoding="utf-8")
+    assert "| units | native projection |" in (new / "stress.md").read_text("utf-8")
+    assert "silently wrong" in (new / "stress.html").read_text("utf-8")
 
 
 def test_silent_error_is_reduced_and_replayed(tmp_path, capsys, shifted):
@@ -71,7 +71,7 @@ def test_silent_error_is_reduced_and_replayed(tmp_path, capsys, shifted):
     )
     capsys.readouterr()
     (file,) = tmp_path.glob("*.toml")
-    (finding,) = json.loads((tmp_path / "stress.json").read_text(encoding="utf-8"))["findings"]
+    (finding,) = json.loads((tmp_path / "stress.json").read_text("utf-8"))["findings"]
     assert (finding["file"], finding["verdict"]) == (file.name, "silently wrong")
     assert len(load_case(file).sweep.values) == 1
     assert main.main(["stress", "--replay", str(file)]) == 1
@@ -80,7 +80,7 @@ def test_silent_error_is_reduced_and_replayed(tmp_path, capsys, shifted):
 
 def test_stress_replay_of_sound_case(tmp_path, capsys):
     file = tmp_path / "rssr.toml"
-    file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
+    file.write_text(case_text(cases.load("rssr")), "utf-8")
     assert main.main(["stress", "--replay", str(file)]) == 0
     assert "right 181" in capsys.readouterr().out
 
@@ -106,7 +106,7 @@ def test_stress_without_samples_has_status_2(tmp_path, capsys, monkeypatch, engi
         f"kincheck: native projection: no sample was judged, {count[1]} unsupported: {why}\n" in err
     )
     file = tmp_path / "rssr.toml"
-    file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
+    file.write_text(case_text(cases.load("rssr")), "utf-8")
     assert main.main(["stress", "--replay", str(file)]) == 2
     out, err = capsys.readouterr()
     assert "unsupported 181" in out

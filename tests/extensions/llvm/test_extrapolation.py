@@ -14,12 +14,15 @@ from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.mechanism.motions import Path
 from kincheck.core.program import NODES, NumpyExecutor, groups_behind, place_of
 
+from ...support.examples import examples
 from ...support.mechanisms import errors, mcpherson, slider_crank, slider_crank_motion
+
+(SPANS,) = examples(__file__, "spans")
 
 STROKES = np.linspace(-0.08, 0.08, 33)
 
 
-@pytest.mark.parametrize(("lanes", "behind"), [(2, 3), (4, 2), (5, 2), (6, 1), (8, 1), (30, 1)])
+@pytest.mark.parametrize(("lanes", "behind"), SPANS)
 def test_extrapolation_nodes_span_groups(lanes, behind):
     nodes = [group * lanes + lane for group, lane in (place_of(k, lanes) for k in range(NODES))]
     assert groups_behind(lanes) == behind

@@ -17,7 +17,10 @@ from kincheck.core.report.sections import Report, Section
 from msgspec.structs import replace
 
 from ...support.browser import CHROMIUM
+from ...support.examples import examples
 from ...support.strut_results import GRID, results, series
+
+(SLIPS,) = examples(__file__, "slips")
 
 NUMBER = r"(-?[\d.]+)"
 
@@ -181,11 +184,7 @@ def test_compare_and_kc_become_papers(tmp_path, without_browser, capsys):
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [
-        (["--summary", "x.pdf"], "--summary x.pdf: the page is HTML"),
-        (["--figures", "taken/x"], "--figures taken/x: the folder cannot be made"),
-        (["--summary", "gone/x.html"], "--summary gone/x.html: cannot be written"),
-    ],
+    SLIPS,
 )
 def test_slips_of_files_are_early(tmp_path, monkeypatch, words, said, capsys):
     monkeypatch.chdir(tmp_path)

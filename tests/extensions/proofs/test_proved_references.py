@@ -21,8 +21,11 @@ from kincheck.core.extensions.proofs.verified_reference import prove_case
 from kincheck.core.jet import arctan2
 
 from ...support.case_texts import refused
+from ...support.examples import examples
 from ...support.fakes import RADIUS, crank
 from ...support.mechanisms import BRANCH, chain
+
+(MISMATCHES,) = examples(__file__, "mismatches")
 
 flint = pytest.importorskip("flint")
 TOL = 1e-12
@@ -101,13 +104,7 @@ def test_unproved_sample_is_nan(made):
 
 @pytest.mark.parametrize(
     ("changes", "problem"),
-    [
-        ({"case": "other"}, "case: found 'other', expected one of the cases to be run: crank"),
-        ({"driver": {"turn": [0.0]}}, "driver: found other samples than those of the sweep"),
-        ({"outputs": {}}, "outputs: found none, expected outputs of the case"),
-        ({"schema": "kincheck-results/1"}, "expected a proved reference"),
-        ({"zq_unknown": 1}, "unknown field `zq_unknown`, expected a proved reference"),
-    ],
+    MISMATCHES,
     ids=str,
 )
 def test_proved_reference_mismatch_is_refused(file, changes, problem):

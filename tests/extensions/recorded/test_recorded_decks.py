@@ -93,7 +93,8 @@ def table(tmp_path, name, scale=None):
     with file.open("w", newline="") as stream:
         csv.writer(stream).writerows([heads, *(row[: len(heads)].tolist() for row in rows)])
     (body,) = mechanism_of(DECKS[name]).bodies
-    place = " ".join(map(repr, map(float, (*body.origin, *body.euler_parameters))))
+    scaled = (2.0 * e for e in body.euler_parameters)  # of any length, as typed with few digits
+    place = " ".join(map(repr, map(float, (*body.origin, *scaled))))
     return ["--recorded", file, "--map", POSE + place, *ACCURACY]
 
 

@@ -20,7 +20,10 @@ from kincheck.core.extensions.sweep.tables import print_sweep
 from kincheck.core.report import sections
 from rich.console import Console
 
+from ...support.examples import examples
 from ...support.planted import as_json, missing, on_terminal, text_of_page, unexplained
+
+OF_SWEEP, OF_KC, OF_EXPLAIN = examples(__file__, "of_sweep", "of_kc", "of_explain")
 
 
 @pytest.fixture(autouse=True)
@@ -43,15 +46,6 @@ def few_outputs(case):
     return dataclasses.replace(case, outputs=tuple(kept))
 
 
-OF_EXPLAIN = [
-    ("schema", "terminal", "for programs"),
-    (r"samples\.(largest|orientation|direction\..*)", "terminal", "as condition, sign and words"),
-    (r"moves\..*", "terminal", "those that move together"),
-    (r"determinacy\.joints", "terminal", "of joints that are not determined"),
-    ("redundant_residual", "terminal", "of redundant rows"),
-]
-
-
 def test_explain_reaches_every_form(tmp_path):
     found = kincheck.explain(few_outputs(load(table_of(tmp_path))), samples=2)
     forms = {
@@ -63,16 +57,6 @@ def test_explain_reaches_every_form(tmp_path):
         "json": as_json,
     }
     assert unexplained(missing(found, forms), OF_EXPLAIN) == ([], [])
-
-
-OF_KC = [
-    (r".*(spin_axis|compliance)", "terminal page csv", "for programs"),
-    (r".*wheel_center", "terminal page", "tables"),
-    (r".*\.(sense|notes)", "terminal page csv", "once, as signs; notes go to standard error"),
-    (r".*\.(axis|at|rigid|wheel_load)", "terminal", "curves"),
-    ("case", "csv", "the name of the file"),
-    (r"loads\..*\.unit", "csv", "as over travel"),
-]
 
 
 def test_kc_reaches_every_form(tmp_path):
@@ -110,18 +94,6 @@ def test_compare_reaches_every_form(tmp_path):
     }
     lacking = missing(found, forms, ["a", "b", "toe", "camber"], r"(?!results|cases|facts).*")
     assert unexplained(lacking, OF_COMPARE) == ([], [])
-
-
-OF_SWEEP = [
-    ("schema", "terminal page", "for programs"),
-    ("mode|seed|quantiles_of", "terminal", "on the page"),
-    ("retried", "page", "how, not what"),
-    (r"coordinates\..*", "terminal page", "the file of the variation"),
-    (r"gradients\..*", "terminal page", "the largest of each output; all in gradients.csv"),
-    (r"outputs\.(?!unit).*", "terminal", "the ends over all samples"),
-    (r"outputs\.(mean|count|standard_errors.*|histogram\..*)", "page", "in envelope.csv"),
-    (r"limits\..*|incomplete", "terminal page", "counts behind the yield, in limits.csv"),
-]
 
 
 def test_sweep_reaches_every_form(tmp_path):

@@ -12,6 +12,7 @@ from kincheck.core.extensions.trace.curve import trace
 
 from ...kinematics.test_redundancy import locomotive
 from ...kinematics.test_singular import LIMITS
+from ...support.examples import examples
 from ...support.mechanisms import (
     CRANK,
     LEAN,
@@ -24,6 +25,8 @@ from ...support.mechanisms import (
     planar_four_bar,
     pushed,
 )
+
+(BAD_ARGUMENTS,) = examples(__file__, "bad_arguments")
 
 # Limit points
 
@@ -127,15 +130,7 @@ def test_trace_without_singular_poses():
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [
-        ({"driver": "steer"}, "no driver 'steer'; known: stroke"),
-        ({"direction": 2}, "direction is 2, expected 1"),
-        ({"length": -1.0}, "length is -1.0, expected a positive number"),
-        ({"longest": np.nan}, "longest is nan"),
-        ({"tol": 0.0}, "tol is 0.0"),
-        ({"style": "dads"}, "there is no style 'dads'; known: native,"),
-        ({"points": ["hub"]}, "no point 'hub'; known: rod_end, wheel"),
-    ],
+    BAD_ARGUMENTS,
     ids=str,
 )
 def test_trace_refuses_bad_arguments(arguments, message):
