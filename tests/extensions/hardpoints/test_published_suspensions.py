@@ -141,7 +141,6 @@ def test_formula_student_pushrod_corner():
         assert found["spring_ratio"][k] == pytest.approx(-rate, abs=1e-8)
 
 
-"""Points of the built-in case mcpherson_suspension, mirrored to the left by their axes."""
 ROAD = ("scrub_radius", "mechanical_trail", "roll_center_height", "half_track_change")
 
 
