@@ -28,7 +28,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..house import budgets, room_of, sizes
+from ..house import WHOLES, budgets, room_of, sizes
 from ..support.sources import ROOT, files
 from .related import Entered
 from .sandbox import Run, Sandbox
@@ -101,7 +101,9 @@ def sample(sites: Mapping[str, Sequence[Sequence[Mutant]]], count: int, seed: in
     A larger number has those of a smaller one, apart from rounding.
     """
     tokens = {
-        room: size.tokens for room, size in sizes(budgets()).items() if not room.startswith("tests")
+        room: size.tokens
+        for room, size in sizes(budgets()).items()
+        if room not in WHOLES and not room.startswith("tests")
     }
     exact = {room: count * n / sum(tokens.values()) for room, n in tokens.items()}
     shares = {room: int(share) for room, share in exact.items()}

@@ -16,7 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from ...support.adams_texts import AT, AXES, HALF, MM, UNITS, Deck, X, Y, Z, about, driven, jointed
 from ...support.case_texts import complains, rows, write
+from ...support.examples import examples
 from ...support.written_again import written_again
+
+(FAULTS,) = examples(__file__, "faults")
 
 
 def read(tmp_path, text, **options):
@@ -438,31 +441,6 @@ def test_adams_distant_markers_are_refused(tmp_path, of_i, words):
 
 
 PLAIN = driven("TIME").text
-FAULTS = """
-BUSHING/3, I = 11, J = 12 | BUSHING/3: forces the motion ... --without BUSHING
-GFORCE/1, I = 11 | GFORCE/1: forces the motion ... --without GFORCE
-BLOB/1, I = 11 | found 'BLOB/1' ... statement
-MA/1, PART = 1 | found 'MA/1' ... abbreviation
-JOINT/2, R, I = 11, J = 12 | found 'R' ... short for several
-JOINT/2, REVOLUTE, I = 11, J = 99 | J = 99: there is no MARKER/99 ... 12
-JOINT/2, REVOLUTE, I = 11 | J: found ... expected an identifier
-JOINT/1, REVOLUTE, I = 11, J = 12 | found again ... line
-MARKER/50, PART = 2, QP = 1, 2 | QP: found '1, 2' ... 3 numbers
-MARKER/50, PART = 2, FOO | found 'FOO' ... no argument
-MARKER/50, PART = 7 | there is no PART/7 ... dataset
-just words | expected a statement KIND/id ... comments
-COUPLER/1, JOINTS = 1, 2, 3, 4 | found 4, expected two ... correct it
-MOTION/8, ROTATION, JOINT = 1, FUNCTION = TIME | MOTION_8 ... driven by others
-SFORCE/1, TRANSL, I = 11, J = 12, FUNCTION = 100 | found a constant ... --without SFORCE/1
-SFORCE/1, TRANSL, I=11, J=12, FUNCTION = -DM(11,12)**2 | DM ... --without SFORCE/1
-SFORCE/1, TRANSL, I=11, J=12, FUNCTION = USER(1,2) | USER, which is not read ... DM
-GCON/1, I = 11, FUNCTION = DX(11,12) | DX, which is not read ... --without GCON/1
-POINT_MASS/1, MASS = 3 | POINT_MASS/1: forces the motion ... --without POINT_MASS
-PART/8, GROUND | GROUND again ... remove one
-UNITS/LENGTH = FURLONG | found again ... line
-PART/8, ZG = 0, 0, 1 | found ZG without XG ... add XG
-MARKER/50, PART = 1, RM = 11 | RM: found no marker of the part ... correct it
-"""
 
 
 @pytest.mark.parametrize(("line", "message"), rows(FAULTS, named=False))

@@ -16,6 +16,10 @@ from kincheck.core.cli.main import main
 from kincheck.core.extensions.code import c, fmu, js
 from scipy.interpolate import CubicSpline
 
+from ...support.examples import examples
+
+REFUSED, LOCKS = examples(__file__, "refused", "locks")
+
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
 CLOSE = 1e-13
 """Largest difference to native, relative to the largest value: a thousand round-offs."""
@@ -266,42 +270,6 @@ component = "z"
     assert found[:, 0, 1] == pytest.approx(1.0, abs=CLOSE)
 
 
-LOCKS = """schema = "kincheck-case/1"
-name = "locks"
-source = "a rod of 1 m from a slide to a crank of 2 m: it locks where they are in line"
-[bodies.crank]
-[bodies.slide]
-[joints.pivot]
-type = "revolute"
-bodies = ["ground", "crank"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[joints.guide]
-type = "translational"
-bodies = ["ground", "slide"]
-point = [0, 0, 0]
-axis = [0, 1, 0]
-[joints.rod]
-type = "distance"
-bodies = ["crank", "slide"]
-points = [[2, 0, 0], [1.2, 0.6, 0]]
-[points.end]
-body = "slide"
-position = [1.2, 0.6, 0]
-[drivers.lift]
-type = "joint_displacement"
-joint = "guide"
-[sweep]
-driver = "lift"
-start = 0.0
-stop = 1.0
-steps = 3
-[outputs.turn]
-type = "joint_angle"
-joint = "pivot"
-"""
-
-
 @compiled
 def test_lock_up_leaves_state_alone(tmp_path):
     """The slide reaches sqrt(3^2 - 1.2^2) m: beyond, a code and no numbers."""
@@ -362,16 +330,7 @@ def test_fmu_takes_held_drivers(version, tmp_path):
     assert_equal(np.array([found[f"{name}.velocity"] for name in names]), expected[k, :, 1])
 
 
-@pytest.mark.parametrize(
-    ("argv", "said"),
-    [
-        ("four_bar --to c --at 1", "--at: the code starts at the design position"),
-        ("four_bar --to c --fmi 3", "--fmi: only an FMU has a version"),
-        ("four_bar --to mjcf --vary a", "--vary: only code takes it"),
-        ("four_bar --to c --vary nothing", "place 'nothing'"),
-        ("four_bar --to cobol", "there is no format 'cobol'"),
-    ],
-)
+@pytest.mark.parametrize(("argv", "said"), REFUSED)
 def test_export_of_code_is_refused(argv, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["export", *argv.split()]) == 2

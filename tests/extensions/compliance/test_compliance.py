@@ -25,7 +25,7 @@ from ...kinematics.test_bushings import bushed
 from ...support.engine_motion import SIMULATORS, installed
 from ...support.examples import examples
 
-(HINGES,) = examples(__file__, "hinges")
+REFUSED, SERIES, WHEEL, HINGES = examples(__file__, "refused", "series", "wheel", "hinges")
 
 DATA = Path(__file__).parents[2] / "data" / "elastokinematics"
 STRUT = json.loads((DATA / "5_strut_kc.json").read_text())
@@ -54,20 +54,6 @@ def strut_text(more=""):
         text += bushing_table(JOINTS[each["name"]], each["name"], each["bodies"], *numbers)
     text += f'[points.contact_patch]\nbody = "knuckle"\nposition = {STRUT["contact_patch"]}\n'
     return text + more
-
-
-WHEEL = """
-[suspension]
-convention = "CONVENTION"
-side = "left"
-forward = [1.0, 0.0, 0.0]
-up = [0.0, 0.0, 1.0]
-wheel_radius = 0.3
-[outputs.toe]
-type = "toe"
-[outputs.camber]
-type = "camber"
-"""
 
 
 OUTBOARD = WHEEL.replace("CONVENTION", "iso8855").replace(
@@ -244,26 +230,10 @@ def test_load_beyond_equilibrium_is_counted(tmp_path, capsys):
     assert "2 further samples without equilibrium. Give less travel or load" in said[-1]
 
 
-@pytest.mark.parametrize(
-    ("more", "options", "expected"),
-    [
-        ('[compliance]\nwheel = "hub"\n', "", "'hub'"),
-        ('[compliance]\ncontact = "nowhere"\n', "", "'nowhere'"),
-        ("[compliance]\nheld = []\n", "", "no held driver lifts the wheel"),
-        ("", "--axle roll", "needs both wheels"),
-        ("", "--load vertical=0:1:2", "'vertical' is none of"),
-        ("", "--travel=0:1", "START:STOP:SAMPLES"),
-        ("", "--travel=0:1furlong:3", "START:STOP:SAMPLES"),
-        ("", "--travel=nan:1:3", "START:STOP:SAMPLES"),
-        ("", "--travel=-30mm", "--travel=20mm:20mm:1 for one place"),
-        ("", f"--out {__file__}", "cannot be made a folder"),
-        ("", "--travel=0:3deg:3", "unless a unit (m, mm, cm, inch, foot) is given"),
-        ("", "--load lateral=0:3Nm:3", "numbers in N or kN"),
-        ("", "--load aligning=0:3N:3", "numbers in Nm or kNm"),
-    ],
-)
+@pytest.mark.parametrize(("more", "options", "expected"), REFUSED)
 def test_kc_without_facts_is_refused(tmp_path, capsys, more, options, expected):
-    assert main(["kc", strut_file(tmp_path, more), *options.split()]) == 2
+    options = options.format(file=__file__).split()
+    assert main(["kc", strut_file(tmp_path, more), *options]) == 2
     assert expected in capsys.readouterr().err
 
 
@@ -414,48 +384,6 @@ def test_bench_compliance_times_samples_and_matrices(tmp_path, capsys):
     assert found["reached"] == found["samples"]
     assert found["us_per_sample"]["median"] > found["us_per_matrix"]["median"] > 0.0
     assert "us a matrix at least" in capsys.readouterr().out
-
-
-SERIES = """
-schema = "kincheck-case/1"
-name = "series"
-source = "made"
-[units]
-length = "mm"
-[bodies.sub]
-mass = 3.0
-center_of_mass = [0, 500, 0]
-[bodies.wheel]
-mass = 10.0
-center_of_mass = [0, 700, 0]
-[forces.a]
-type = "bushing"
-bodies = ["ground", "sub"]
-point = [0, 700, 0]
-stiffness = 300
-turning_stiffness = 5e8
-[forces.b]
-type = "bushing"
-bodies = ["sub", "wheel"]
-point = [0, 700, 0]
-stiffness = [1000, 2000, 600]
-turning_stiffness = 5e8
-[points.wheel_center]
-body = "wheel"
-position = [0, 700, 0]
-[points.contact_patch]
-body = "wheel"
-position = [0, 700, -300]
-[drivers.stroke]
-type = "point_coordinate"
-point = "wheel_center"
-direction = [0, 0, 1]
-[sweep]
-driver = "stroke"
-start = 0
-stop = 10
-steps = 2
-"""
 
 
 @pytest.mark.parametrize("name", ["mujoco", "exudyn", "exudyn-static"])

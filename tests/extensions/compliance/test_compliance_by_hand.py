@@ -6,12 +6,10 @@ centre is 0.05 m outside the balls at half height, and the contact 0.3 m below i
 """
 
 import kincheck
-import numpy as np
 import pytest
-from kincheck.core.cli.main import main
 
 KX, KY, KZ = 2e5, 4e5, 3e5
-SPRING, BAR, TIRE = 6e4, 700.0, 2e5
+SPRING, BAR = 6e4, 700.0
 BRACKET = 0.05
 # Of a ball: along y, and along x, where the arm turns on its bushings too.
 BY_Y, BY_X = 1.0 / (2.0 * KY), 1.0 / (2.0 * KX) + 0.4**2 / (2.0 * KY * 0.2**2)
@@ -118,24 +116,6 @@ def test_brake_or_drive_torque_on_knuckle(tmp_path, key, load, place):
     assert found == pytest.approx(sign * part * BY_X, rel=1e-12)
 
 
-@pytest.mark.parametrize("factor", [1.0, 1000.0], ids=["m", "mm"])
-def test_ride_rate_with_tire_in_series(tmp_path, factor, capsys):
-    """In units of the file; the JSON file is in SI, the table in N/mm."""
-    text = "" if factor == 1.0 else '[units]\nlength = "mm"\n'
-    text += corner("", 1.0, factor) + wheel(radius=factor * 0.3)
-    text += f"[compliance]\ntire_stiffness = {TIRE / factor}\n"
-    values = {k: x.values[0] for k, x in study(tmp_path, text, [0.0]).travel.outputs.items()}
-    series, arm = 1.0 / (rise(SPRING) + 1.0 / TIRE), 2.0 * 0.75**2
-    assert values["wheel_rate"] == pytest.approx(1.0 / rise(SPRING), rel=1e-12)
-    assert values["ride_rate"] == pytest.approx(series, rel=1e-12)
-    assert values["roll_stiffness"] == pytest.approx(arm / rise(SPRING), rel=1e-12)
-    assert values["roll_rate"] == pytest.approx(arm * series, rel=1e-12)
-    assert main(["kc", str(tmp_path / "car.toml"), "--travel=0"]) == 0
-    out = capsys.readouterr().out
-    assert f"wheel_rate [N/mm]  {1e-3 / rise(SPRING):.6g}" in out
-    assert f"toe.per_lateral_force [deg/kN]  {-np.degrees(500.0 * BY_Y / 0.15):.6g}" in out
-
-
 BAR_TEXT = "".join(
     f"""[bodies.bar{name}]
 origin = [0.4, {side * 0.3}, 0.05]
@@ -159,69 +139,3 @@ turning_stiffness = [0.0, {BAR}, 0.0]
 """
 OTHER = '[suspension.other]\nwheel_center = "center_right"\ntravel = "jounce_right"\n'
 OTHER += '[drivers.jounce_right.motion]\ntype = "ramp"\nrate = 1.0\n'
-
-
-def axle():
-    text = corner("", 1.0, 1.0) + corner("_right", -1.0, 1.0) + BAR_TEXT + OTHER
-    return text + wheel() + f"[compliance]\ntire_stiffness = {TIRE}\n"
-
-
-def test_anti_roll_bar_stiffens_roll_only(tmp_path):
-    """Half bars of 0.4 m: by a rise d of each link they twist by 2 d / 0.4 against each other."""
-    found = study(tmp_path, axle(), [0.0]).travel
-    values = {name: curve.values[0] for name, curve in found.outputs.items()}
-    alike, against = (1.0 / rise(k) for k in (SPRING, SPRING + BAR * 2.0 / 0.4**2))
-    assert values["wheel_rate"] == pytest.approx(alike, rel=1e-11)
-    assert values["wheel_rate_opposite"] == pytest.approx(against, rel=1e-11)
-    assert values["roll_stiffness"] == pytest.approx(2.0 * 0.75**2 * against, rel=1e-11)
-    assert values["anti_roll_share"] == pytest.approx((against - alike) / against, rel=1e-10)
-    tired = 1.0 / (1.0 / against + 1.0 / TIRE)
-    assert values["roll_rate"] == pytest.approx(2.0 * 0.75**2 * tired, rel=1e-11)
-
-
-@pytest.mark.parametrize(("motion", "sign"), [("heave", 1.0), ("roll", -1.0)])
-def test_axle_loads_in_heave_and_roll(tmp_path, motion, sign):
-    """Lateral forces on both contacts, along the axes; the bar couples lean by the held heights."""
-    values = {"lateral": [0.0, 10.0]}
-    curves = study(tmp_path, axle(), [0.0], values, axle=motion).loads["lateral"]
-    C = curves.compliance[0]
-    camber = curves.outputs["camber.per_lateral_force"].values[0]
-    assert -camber == pytest.approx(C[3, 1] + sign * C[3, 7], rel=1e-12)
-    assert C[7, 7] == pytest.approx(C[1, 1], rel=1e-12)
-    slope = 0.1 * (curves.outputs["camber"].values[1] - curves.outputs["camber"].values[0])
-    assert slope == pytest.approx(camber, rel=1e-4)
-
-
-SOFT = 8e5
-GUIDED = """[bodies.carrier]
-[joints.guide]
-type = "translational"
-bodies = ["ground", "carrier"]
-point = [0.0, 0.3, 0.3]
-axis = [0.0, 1.0, 0.0]
-[forces.soft]
-type = "bushing"
-bodies = ["ground", "carrier"]
-point = [0.0, 0.3, 0.3]
-"""
-
-
-@pytest.mark.parametrize("law", ["stiffness", "curve"])
-def test_rack_and_subframe_springs_in_series(tmp_path, law):
-    """A guided body on rubber between the car and the tie rod, or both arms. A progressive curve
-    starts with the same rate.
-    """
-    rates = {
-        "stiffness": f"stiffness = [0.0, {SOFT}, 0.0]\n",
-        "curve": f"curve = [[], {[[k * 1e-3, k * 1e-3 * SOFT] for k in range(-3, 4)]}, []]\n",
-    }
-    plain = GUIDED + rates[law] + corner("", 1.0, 1.0) + wheel()
-    rack = plain.replace('["ground", "knuckle"]', '["carrier", "knuckle"]')
-    found = study(tmp_path, rack, [0.0]).travel.outputs["toe.per_aligning_torque"].values[0]
-    assert found == pytest.approx(-(0.5 * BY_Y + 1.0 / SOFT) / 0.15**2, rel=1e-12)
-    frame = plain.replace('["ground", "lower"]\npoint', '["carrier", "lower"]\npoint')
-    frame = frame.replace('["ground", "upper"]', '["carrier", "upper"]')
-    found = study(tmp_path, frame, [0.0]).travel
-    assert found.outputs["toe.per_lateral_force"].values[0] == pytest.approx(
-        -(0.5 * BY_Y + 1.0 / SOFT) / 0.15, rel=1e-12
-    )

@@ -9,6 +9,10 @@ from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 
+from ...support.examples import examples
+
+(OTHER,) = examples(__file__, "other")
+
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory):
@@ -90,16 +94,7 @@ def test_spring_has_the_tables_own_name(tmp_path, capsys):
     assert "already. Leave out 'Feder'" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("spring", "said"),
-    [
-        ("spring: 35", "'35' is not a positive rate in N/m, N/mm"),
-        ("spring: -35 N/mm", "'-35 N/mm' is not a positive rate"),
-        ("spring: 35 N/mm, 3", "'3' is not a force at design in N, kN"),
-        ("spring: 35,5 N/mm", "'35' is not a positive rate"),
-        ("damper: 35 N/mm", "there is no spring 'damper', but spring, tire"),
-    ],
-)
+@pytest.mark.parametrize(("spring", "said"), OTHER)
 def test_other_springs_are_refused(table, capsys, spring, said):
     assert main(["kc", str(table), "--travel=0", "--spring", spring]) == 2
     assert said in capsys.readouterr().err

@@ -18,7 +18,7 @@ from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from ...support.examples import examples
 
-(SLIDES,) = examples(__file__, "slides")
+BAD_OPTIONS, RUBBER, SLIDES = examples(__file__, "bad_options", "rubber", "slides")
 
 DEG = np.pi / 180.0
 NOISE = {"toe": 0.005 * DEG, "camber": 0.01 * DEG, "half_track_change": 5e-5}
@@ -281,16 +281,7 @@ def test_fit_reads_german_rig(tmp_path, capsys):
     assert "18 numbers of toe, camber" in out
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--move", "tierod_iner: y"], "did you mean 'tierod_inner'?"),
-        (["--drawing", "2 deg"], "--drawing '2 deg': found the box '2 deg'"),
-        (["--free", "toe zer"], "did you mean 'toe zero'?"),
-        (["--move", "uca_outer: z +5 -2 mm"], "a deviation is the same both ways"),
-        (["--accuracy", "toe=x"], "expected a positive number"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), BAD_OPTIONS)
 def test_fit_bad_option_is_refused(bench, capsys, words, message):
     file = bench[0]
     rig = file.with_name("rig.csv")
@@ -306,21 +297,6 @@ def test_fit_travel_beyond_lock_is_refused(bench, tmp_path, capsys):
     assert main(["fit", str(bench[0]), "--measured", str(Path("no.csv"))]) == 2
 
 
-RUBBER = """\
-[bushings.uca_rear]
-stiffness = [1e6, 2e6, 1e6]
-turning_stiffness = [100.0, 100.0, 0.0]
-
-[bushings.lca_front]
-stiffness = 3e6
-turning_stiffness = [100.0, 100.0, 0.0]
-
-[bushings.uca_front]
-stiffness = 1e6
-
-[bushings.lca_rear]
-stiffness = 1e6
-"""
 RATES = {"uca_rear x": 0.2, "lca_front y": -0.3}
 COMPLIANCE = {"toe": "lateral", "camber": "lateral", "wheel_center.y": "braking"}
 

@@ -349,10 +349,7 @@ def test_tune_follows_measured_curve(car):
     assert [found["moves_m"][each] for each in places] == pytest.approx(offset, abs=2e-4)
 
 
-@pytest.mark.parametrize(
-    ("goal", "move", "message"),
-    BAD_TEXTS,
-)
+@pytest.mark.parametrize(("goal", "move", "message"), BAD_TEXTS)
 def test_tune_bad_text_is_refused(car, capsys, goal, move, message):
     assert main(["tune", str(car), "--goal", goal, "--move", move]) == 2
     assert message in capsys.readouterr().err

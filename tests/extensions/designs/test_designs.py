@@ -38,7 +38,6 @@ from ...support.mechanisms import (
     Z,
     chain,
     circles_meet,
-    errors,
     four_bar,
     planar_four_bar,
     solve_all,
@@ -60,21 +59,6 @@ def test_locked_variant_is_refused(values):
 
 
 # 128 of them at once, or 32 of many samples
-@pytest.mark.parametrize("samples", [7, 2001])
-def test_designs_match_single_solves(samples):
-    mechanism, _ = strut()
-    values, place = np.linspace(-0.05, 0.05, samples), "joints.tie_rod.points.0"
-    moved = np.array([1.115, 0.665, 0.118]) + np.random.default_rng(3).normal(size=(300, 3)) * 1e-3
-    found = solve_designs(mechanism, "stroke", values, {place: moved}, order=1)
-    motion = found.points["wheel_center"]
-    assert motion.position.shape == (300, samples, 3)
-    assert motion.acceleration is None
-    assert found.solved.all()
-    assert found.messages == {}
-    for k in (0, 255, 256, 299):
-        own = solve(placed(mechanism, {place: tuple(moved[k])}), "stroke", values)
-        expected = motion.position[k], motion.velocity[k]
-        assert (errors(own.points["wheel_center"], expected) <= SAME).all()
 
 
 @pytest.mark.parametrize(
@@ -282,21 +266,6 @@ def test_lanes_extrapolate_or_use_rates(values, compiled, order, monkeypatch):
     assert np.array_equal(found.kept[rows], by_rates.kept[rows]) == (
         values is ROUGH["every sample twice"]
     )
-
-
-@pytest.mark.parametrize(
-    "path",
-    [PATHS["from design, both ways"], Path({"stroke": Ramp(1.0)}, np.linspace(-0.06, 0.06, 61))],
-    ids=["coarse", "fine"],
-)
-def test_lane_ignores_neighbours(path):
-    mechanism, varied = strut()
-    route, numbers = lanes_of(path, mechanism, varied, order=0), drawn(mechanism, varied, 40, 2e-3)
-    together = solve_variants(route, numbers, TOL).kept
-    rows = slice(0, route.model.rows["iterations"].start)
-    for columns in (slice(3, 4), slice(17, 40), [5, 2, 31]):
-        apart = solve_variants(route, numbers[:, columns], TOL).kept
-        np.testing.assert_array_equal(apart[rows], together[rows][:, :, columns])
 
 
 @pytest.mark.parametrize("compiled", [True, False])

@@ -16,7 +16,6 @@ from kincheck import (
     Distance,
     JointAngle,
     Mechanism,
-    OrientationLock,
     Outcome,
     Point,
     PointCoordinate,
@@ -26,7 +25,6 @@ from kincheck import (
     Spline,
     Translational,
     cases,
-    solve,
 )
 from kincheck.adapters import engine
 from kincheck.core.case.case import Output, Sweep, Truth, without_forces
@@ -34,7 +32,6 @@ from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.measures import DriverEffort
 from kincheck.core.case.models.files import load
 from kincheck.core.case.quantity import with_markers
-from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.explain.diagnose import determinacy, diagnose
 from kincheck.core.extensions.explain.rank import Ranks, free_motions
@@ -47,8 +44,11 @@ from kincheck.core.kinematics import NativeSolver, kinds
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.report.terminal import console
 
+from ...support.examples import examples
 from ...support.fakes import swept
 from ...support.mechanisms import ORIGIN, four_bar, mcpherson, slider_crank
+
+(DIRECTIONS,) = examples(__file__, "directions")
 
 
 def totals(lines):
@@ -351,31 +351,6 @@ def test_unreached_motion_lacks_spring_torque():
     assert diagnose(of, samples=41, tol=1e-12).samples == []
 
 
-@pytest.mark.usefixtures("in_folder", "own_joint_types")
-def test_joint_by_residual_is_explained():
-    """A marble in a bowl: z = x^2 / (2 R), so z' = x / R, z'' = 1 / R, and dz / dR = -z / R."""
-    bowl = load_joint("bowl:Bowl")("bowl", "ground", "marble", ORIGIN, Z, 0.4)
-    marble = Mechanism(
-        "marble",
-        [Body("marble")],
-        [bowl, OrientationLock("upright", "ground", "marble")],
-        [Point("centre", "marble", ORIGIN)],
-        [PointCoordinate("along", "centre", X), PointCoordinate("across", "centre", Y)],
-    )
-    x = np.linspace(-0.2, 0.2, 5)
-    found = solve(marble, "along", x).points["centre"]
-    assert found.position[:, 2] == pytest.approx(x * x / 0.8, abs=1e-15)
-    assert found.velocity[:, 2] == pytest.approx(x / 0.4, abs=1e-14)
-    assert found.acceleration[:, 2] == pytest.approx(1.0 / 0.4, abs=1e-13)
-    explained = diagnose(case(marble, x, "centre"), samples=3, tol=1e-12)
-    slope = next(
-        each
-        for each in explained.sensitivities
-        if each.output == "z" and each.number == "joints.bowl.radius"
-    )
-    assert slope.by_sample[0] == pytest.approx(-0.05 / 0.4)
-
-
 # The command diagnose: what it says, and its exit statuses
 
 
@@ -462,14 +437,12 @@ def found(name, *, massless=False, asked=False):
     return determinacy(case, NativeSolver().prepare(mechanism, sweep.path, bodies=names)(1e-12))
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"), [("four_bar", (2, 1, 3)), ("bennett", (0, 1, 3)), ("bricard", (2, 2, 5))]
-)
+@pytest.mark.parametrize(("name", "expected"), DIRECTIONS)
 def test_reaction_directions_are_counted_by_joint(name, expected):
     """The numbers are those of forces.md of the study."""
     made = found(name, massless=True)
     assert made.joints == len(made.partly) > 3
-    assert {(each.force, each.moment, each.wrench) for each in made.partly} == {expected}
+    assert {(each.force, each.moment, each.wrench) for each in made.partly} == {tuple(expected)}
     assert made.efforts == []
     assert "4 of 4" in str(made) or name == "bricard"
 

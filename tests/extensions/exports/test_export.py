@@ -153,10 +153,7 @@ def test_export_command_writes_files(to, endings, tmp_path, monkeypatch, capsys)
     assert found.bodies["knuckle"][0][2] == pytest.approx(0.131, abs=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("argv", "said"),
-    BAD_ARGUMENTS,
-)
+@pytest.mark.parametrize(("argv", "said"), BAD_ARGUMENTS)
 def test_export_command_refuses_bad_arguments(argv, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mcpherson_strut.xml").write_text("mine")

@@ -25,7 +25,10 @@ from kincheck.core.extensions.free.free_dynamics import free_motion
 from kincheck.core.mechanism.loads import SpringDamper, Torque, TorsionSpringDamper
 from scipy.special import ellipj, ellipk
 
+from ...support.examples import examples
 from ...support.mechanisms import ORIGIN, X, Y, Z
+
+(CASE,) = examples(__file__, "case")
 
 G = 9.80665
 
@@ -221,32 +224,6 @@ def test_free_parallelogram_ends_at_change_point():
 def test_free_motion_without_law_is_refused(changed, rates, message):
     with pytest.raises(SolveError, match=message):
         free_motion(pendulum(**changed), np.linspace(0.0, 1.0, 3), rates)
-
-
-CASE = """
-schema = "kincheck-case/1"
-name = "swing"
-source = "a pendulum"
-gravity = [0.0, 0.0, -9806.65]
-[units]
-length = "mm"
-angle = "deg"
-[bodies.rod]
-mass = 2.0
-center_of_mass = [0.0, 0.0, -700.0]
-[joints.hinge]
-type = "revolute"
-bodies = ["ground", "rod"]
-point = [0.0, 0.0, 0.0]
-axis = [1.0, 0.0, 0.0]
-[outputs.angle]
-type = "joint_angle"
-joint = "hinge"
-[free]
-rates = {hinge = 540.0}
-duration = 2.0
-samples = 3
-"""
 
 
 @pytest.fixture

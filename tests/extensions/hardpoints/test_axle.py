@@ -18,9 +18,14 @@ from kincheck.core.harness.execution import Answer, Pair, attempt
 
 from ...oracles.rods import Carrier
 from ...support.case_texts import complains, rows, supplied, write
+from ...support.examples import examples
 from ...support.rods_of_templates import RODS as ALL_RODS
 from ...support.rods_of_templates import solved
 from ...support.written_again import written_again
+
+OPTION_FAULTS, FAULTS, SIDE_FAULTS, TABLES = examples(
+    __file__, "option_faults", "faults", "side_faults", "tables"
+)
 
 WHEELBASE = 1.55
 RODS = {name: ALL_RODS[name] for name in ("double_wishbone", "five_link", "mcpherson")}
@@ -161,23 +166,6 @@ def test_axle_in_heave_equals_one_wheel(tmp_path):
     assert np.abs(found["axle_roll_center_offset"]).max() < CLOSE
 
 
-@pytest.mark.parametrize("name", TEMPLATES)
-def test_axle_points_mirror_one_wheel(tmp_path, name):
-    """As those of one wheel, mirrored for the right; what is fixed stays so, steered or not."""
-    file = table(tmp_path, name)
-    wheel, both = (
-        load(file, Supplied(travel="0.02:3", axle=motion)).mechanism for motion in (None, "roll")
-    )
-    found = {point.name.strip("~"): (point.body, point.position) for point in both.points}
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        for point in wheel.points:
-            body, position = found.pop(f"{side}_{point.name.strip('~')}")
-            x, y, z = point.position
-            assert body == (point.body if point.body == "ground" else f"{side}_{point.body}")
-            assert position == pytest.approx((x, sign * y, z), abs=1e-15)
-    assert not found
-
-
 def test_axle_without_steering(tmp_path):
     case = axle(tmp_path, "three_link", "roll")
     assert [driver.name for driver in case.mechanism.drivers] == ["left_stroke", "right_stroke"]
@@ -207,25 +195,6 @@ def changed(folder, *edits):
         text, count = re.subn(old, new, text, flags=re.DOTALL)
         assert count
     return write(folder, text)
-
-
-FAULTS = """
-other side | (left_toe.*?side = )"left" | \\1"middle"
-    | outputs.left_toe ... 'middle' ... left, right
-no other | \\[suspension.other.*?(?=\\[outputs) |
-    | outputs.right_toe.side ... found 'right' ... expected left ... add [suspension.other]
-no other for an axle | \\[suspension.other.*(?=\\[outputs.track) |
-    | suspension.other: missing ... outputs.track of type 'track' ... Add [suspension.other]
-one wheel twice | (other.*?center = )"right | \\1"left
-    | suspension.other.side ... 'right' ... on the other side
-no point | (other.*?)right_wheel_center | \\1right_wheel_centre
-    | suspension.other.wheel_center ... 'right_wheel_center'
-upside down | ("right_lca_outer"), ("right_uca_outer") | \\2, \\1
-    | suspension.other.kingpin ... the lower point, then the upper
-no driver | travel = "right_stroke" | travel = "right_strike"
-    | suspension.other.travel ... 'right_stroke'
-side of an axle | type = "track" | type = "track"\\nside = "left" | outputs.track ... side
-"""
 
 
 @pytest.mark.parametrize(("old", "new", "message"), rows(FAULTS))
@@ -293,28 +262,6 @@ def test_anti_outputs_need_vehicle_data(tmp_path):
     names = {each.name for each in load(table(tmp_path), said).outputs}
     assert "wheelbase_change" in names
     assert not [name for name in names if "anti" in name]
-
-
-OPTION_FAULTS = """
-axle | axle=pitch | --axle ... 'pitch' ... heave
-wheelbase | axle=steer wheelbase=two | --wheelbase ... 'two' ... a length
-negative wheelbase | axle=steer wheelbase=-2 | --wheelbase ... -2 m
-position | position=frnt | --position ... 'frnt' ... 'front'
-height | cg_height=half | --cg-height ... 'half' ... a length
-negative height | cg_height=-0.5 | --cg-height ... -0.5 m
-percent | brake_share=60 | --brake-share ... '60' ... 0 to 1
-no share | drive_share=all | --drive-share ... 'all' ... 0 to 1
-rack | rack=40 | --rack ... '40' ... up to 1 m
-words | rack=left | --rack ... 'left' ... START:STOP
-rack twice | rack=0.04 axle=steer | --rack ... beside --axle steer
-rack without tie rod | rack=0.02 template=three_link
-    | --rack: found a travel, but ... three_link has no tie rod
-steering without tie rod | axle=steer template=three_link
-    | --axle: found steer, but ... no tie rod, ... heave or roll
-travel in mm | travel=50 | --travel ... '50' ... up to 1 m
-nowhere | travel=0.1:0.1:5 | --travel ... '0.1:0.1:5'
-backwards | travel=-0.05 | --travel ... '-0.05'
-"""
 
 
 @pytest.mark.parametrize(("options", "message"), rows(OPTION_FAULTS))
@@ -390,36 +337,12 @@ def test_side_comment_in_hardpoint_table(tmp_path):
     np.testing.assert_allclose(again["toe"], ours["toe"], rtol=CLOSE, atol=CLOSE)
 
 
-SIDE_FAULTS = """
-file says left | FR | # side: left | | y = -750 mm ... side says left
-option says right | FL | | side=right | y = 750 mm ... --side says right
-option and file | FL | # side: left | side=right | --side: found right ... left side
-no side | FL | | side=lft | --side: found 'lft' ... 'left'
-upside down | FR | | axes=forward,right,down | above
-left-handed | FL | | axes=forward,right,up | left-handed ... --side right
-no such corner | FL | | corner=FR | --corner: found no point of FR
-no such axle | FL | | corner=front | --corner: found no point of front
-no corner | FL | | corner=nose | --corner: found 'nose' ... FL, FR, RL, RR
-"""
-
-
 @pytest.mark.parametrize(("corner", "above", "options", "message"), rows(SIDE_FAULTS))
 def test_contradictory_sides_are_refused(tmp_path, corner, above, options, message):
     own = {name: value for name, value in vars(supplied(options)).items() if f"{name}=" in options}
     complains(plain(tmp_path, "mcpherson", corner, above), message, of("mcpherson", **own))
 
 
-TABLES = """
-column | corner,point,x,y,z | {corner},{name},{x},{y},{z}
-words | wheel;name;x;y;z | {axle} {side};{name};{x};{y};{z}
-last column | name,x,y,z,corner | {name},{x},{y},{z},{corner}
-two columns | axle,side,point,x,y,z | {axle},{side},{name},{x},{y},{z}
-letters | axle,side,point,x,y,z | {corner[0]},{corner[1]},{name},{x},{y},{z}
-merged cells | corner,point,x,y,z | {first},{name},{x},{y},{z}
-suffix | name,x,y,z | {name}_{corner},{x},{y},{z}
-prefix | name,x,y,z | {corner}_{name},{x},{y},{z}
-script | % the car | {corner}.{name} = [{x} {y} {z}];
-"""
 WORDS = {"F": "Front", "R": "Rear"}, {"L": "Left", "R": "Right"}
 
 

@@ -18,7 +18,10 @@ from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.mechanism.loads import SpringDamper
 
 from ...support.case_texts import BASE, INLINE, rows, write
+from ...support.examples import examples
 from ...support.sources import ROOT
+
+(FAULTS,) = examples(__file__, "faults")
 
 AXLE = json.loads((ROOT / "tests/data/elastokinematics/8_hmmwv_axle.json").read_text())
 P = AXLE["points"]
@@ -155,21 +158,6 @@ def test_axle_bushings_are_mirrored(tmp_path, capsys):
     C = compliance(case, [0.02]).travel.compliance[0]
     mirror = np.diag([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
     assert C[:6, :6] == pytest.approx(mirror @ C[6:, 6:] @ mirror, abs=1e-13 * np.abs(C).max())
-
-
-FAULTS = """
-misspelt role | [bushings.lca_frnt]\\nstiffness = 5e6 | did you mean 'lca_front'
-role of no joint | [bushings.wheel_center]\\nstiffness = 5e6
-    | a role of a joint of double_wishbone
-beside the rod | [joints.tie_rod.bushings.a]\\nstiffness = 5e6\\npoint = [0.07, 0.22, 0.16]
-    | at neither end of the rod; give the one on 'ground', [0.07 m, 0.22 m, 0.15 m]
-other bodies | [joints.tie_rod.bushings.a]\\nstiffness = 5e6\\nbodies = ["ground", "lca"]
-    | are not those of the rod, 'ground' and 'knuckle'; leave bodies out
-negative stiffness | [bushings.lca_front]\\nstiffness = -3.0 | zero or more
-misspelt key | [bushings.lca_front]\\nstifness = 3.0 | did you mean 'stiffness'
-no stiffness | [bushings.lca_front] | has no stiffness
-empty | | found no bushing
-"""
 
 
 @pytest.mark.parametrize(("text", "message"), rows(FAULTS))

@@ -16,19 +16,10 @@ from kincheck.core.errors import CaseError
 from ...support.case_texts import complains, rows, write
 from ...support.examples import examples
 
-(LOTUS,) = examples(__file__, "lotus")
+POINTS, EDITS, FORMS, ADAMS, LOTUS = examples(
+    __file__, "points", "edits", "forms", "adams", "lotus"
+)
 
-POINTS = {
-    "uca_front": (-89.75, -259.75, 285.25),
-    "uca_rear": (110.25, -264.75, 280.25),
-    "uca_outer": (15.25, -539.75, 312.25),
-    "lca_front": (-119.75, -209.75, 125.25),
-    "lca_rear": (130.25, -214.75, 120.25),
-    "lca_outer": (-4.75, -574.75, 118.25),
-    "tierod_inner": (-69.75, -219.75, 150.25),
-    "tierod_outer": (-74.75, -559.75, 148.25),
-    "wheel_center": (0.25, -611.75, 228.25),
-}
 SAID = Supplied("double_wishbone", "mm", "rearward,right,up")
 
 
@@ -70,34 +61,6 @@ def columns(head=("name", "x", "y", "z")):
     """The table with a column a point."""
     rows = [head, *((name, *map(str, at)) for name, at in POINTS.items())]
     return "\n".join(";".join(each) for each in zip(*rows, strict=True)) + "\n"
-
-
-FORMS = """
-trailing separators | name;x;y;z; | {};{};{};{};
-trailing in rows | name;x;y;z | {};{};{};{};;;
-trailing in the head | name;x;y;z;; | {};{};{};{}
-trailing commas | name,x,y,z, | {},{},{},{},
-further columns | No;Name;X [mm];Y [mm];Z [mm];Remark | 1;{};{};{};{};is 1,5 off
-commas and further | name,x,y,z,mass,by | {},{},{},{},1.5,me
-other order | z;y;x;name | {3};{2};{1};{0}
-units below | name;x;y;z\\n;[mm];[mm];[mm] | {};{};{};{}
-points | Point;X_mm;Y_mm;Z_mm | {};{};{};{}
-Adams columns | hardpoint_name;x_value;y_value;z_value | {};{};{};{}
-three decimals | name;x;y;z | {};{:.3f};{:.3f};{:.3f}
-index of pandas | ,x,y,z | {},{},{},{}
-a name of its own for names | Bezeichnung;X;Y;Z | {};{};{};{}
-units in words | name;x in mm;y in mm;z in mm | {};{};{};{}
-long names of axes | name;X-coordinate [mm];Y-coordinate [mm];Z-coordinate [mm] | {};{};{};{}
-units with a slash | name;x/mm;y/mm;z/mm | {};{};{};{}
-blank columns | ;name;;x;y;z; | ;{};;{};{};{};
-spaces around | name ; x ; y ; z |  {} ;  {} ; {} ;{}
-quoted | "name";"x";"y";"z" | "{}";"{}";"{}";"{}"
-numbered | No.;Name;x;y;z | 7;{};{};{};{}
-comment of a spreadsheet | "# axes: rearward,right,up"\\n# units: mm;;;\\nname;x;y;z | {};{};{};{}
-comment in cells | # axes: rearward;right;up\\nname;x;y;z | {};{};{};{}
-title with a unit | units: mm\\nname;x;y;z | {};{};{};{}
-title | Front suspension, left\\n\\nDate;2026-11-26;;\\nname;x;y;z | {};{};{};{}
-"""
 
 
 @pytest.mark.parametrize(("head", "row"), rows(FORMS))
@@ -155,36 +118,6 @@ def test_row_without_remark_is_read(tmp_path):
     whole = table("name,x,y,z,meaning", "{},{},{},{},a remark")
     found = read(tmp_path, whole.removesuffix(",a remark\n"))
     assert found.mechanism == read(tmp_path, whole).mechanism
-
-
-EDITS = """
-thousands and decimals | -611.75 | -1.611,75
-    | line 10: wheel_center: y ... '-1.611,75' ... thousands
-two commas | -611.75 | -1,611,750 | '-1,611,750' ... thousands
-thousands by a blank | -611.75 | -1 611.75 | line 10 ... separators of thous
-thousands of the Swiss | -611.75 | -1'611.75 | separators of thousands
-below no head | 228.25 | 228;25 | line 10 ... found 5 fields
-points above the head | name;x | lca_front;1;2;3\\nname;x
-    | line 1 ... expected the head ... above the points
-row of two units | y;z | y;z\\n;mm;mm;m | line 2 ... Name the point
-unknown unit | x;y;z | x [furlong];y [furlong];z [furlong] | unit ... 'furlong'
-sign of one y | -219.75 | 219.75
-    | tierod_inner ... y = 219.75 mm ... on the other side than wheel_center ... Correct its
-formula | -611.75 | =A1+1 | line 10: wheel_center: y ... '=A1+1' ... save the
-error of a formula | -611.75 | #REF! | line 10: wheel_center: y ... '#REF!'
-unit in a cell | -611.75 | -611.75 mm | '-611.75 mm' ... Leave the unit out
-fraction | -611.75 | -611 3/4 | '-611 3/4' ... Correct the number
-letter O | -611.75 | -61O.75 | '-61O.75' ... Correct the number
-NaN | -611.75 | NaN | 'NaN'
-infinite | -611.75 | inf | 'inf'
-dash for nothing | -611.75 | - | line 10: wheel_center: y ... '-'
-date | -611.75 | 2026-05-01 | '2026-05-01' ... took the number for a date
-hexadecimal | -611.75 | 0x1F | '0x1F'
-point without numbers | 0.25;-611.75;228.25 | ;; | line 10 ... Complete the
-missing point | wheel_center;0.25;-611.75;228.25\\n | | missing wheel_center, the wheel's centre
-twice, equal | 228.25 | 228.25\\nwheel_center;0.25;-611.75;228.25 | given before, in line 10
-twice, named otherwise | 228.25 | 228.25\\nWheel Centre;0;-600;228.25 | 'Wheel Centre' (line
-"""
 
 
 @pytest.mark.parametrize(("old", "new", "message"), rows(EDITS))
@@ -297,20 +230,6 @@ def test_missing_points_advise_names_option(tmp_path, capsys):
     options += ["--names", str(names)]
     assert main(["run", str(file), "--engine", "native", *options]) == 2
     assert "left out: nothing" in capsys.readouterr().err
-
-
-ADAMS = """[UNITS]
- LENGTH = 'mm'
-[HARDPOINT]
-{{hardpoint_name symmetry x_value y_value z_value}}
-{}
-(VARIANTS)
-{{hardpoint_name symmetry x_value y_value z_value}}
- 'lca_outer' 'left/right' -5 -580 115
- 'spare' 'left/right' 1 2 3
-[PARAMETER]
- 'a' 'single' 'real' 1
-"""
 
 
 def test_adams_hardpoint_variants_are_omitted(tmp_path, plain):

@@ -16,7 +16,9 @@ from ...support.case_texts import complains, line_with, rows, write
 from ...support.examples import examples
 from .test_hardpoint_dialects import POINTS, comma, table
 
-(CORNERS,) = examples(__file__, "corners")
+FAULTS, PATTERNS, EXPLORER, CORNERS = examples(
+    __file__, "faults", "patterns", "explorer", "corners"
+)
 
 SAID = Supplied("double_wishbone", "mm", "rearward,right,up")
 
@@ -51,21 +53,6 @@ NESTED = {
     "wheel": {"center": "wheel_center"},
 }
 NESTED = {part: {end: POINTS[role] for end, role in ends.items()} for part, ends in NESTED.items()}
-PATTERNS = """
-a coordinate a row | car.csv | axes | {}_{},{} |
-axis in a cell | car.csv | axes | {};{};{} |
-no head | car.csv | lines | {};{};{};{} |
-no head, names last | car.csv | lines | {1},{2},{3},{0} |
-head, names last | car.csv | lines | {1},{2},{3},{0} | X,Y,Z,\\n(mm),(mm),(mm),\\n
-blanks | car.txt | lines | {}   {}  {} {} | name x [mm] y [mm] z [mm]\\n
-blanks, no head | car.dat | lines | {}   {}  {} {} |
-SolidWorks | car.txt | axes | "{}_{}" = {}mm |
-Python | car.txt | lines | p['{}'] = np.array([{}, {}, {}]) |
-one letter a line | car.m | axes | P.{}.{} = {}; |
-YAML | car.yaml | lines | {}: {{x: {}, y: {}, z: {}}} |
-YAML, lists | car.yml | lines | {}: [{}, {}, {}] | units: millimeters\\n
-YAML, named items | car.yaml | lines | - [{}, {}, {}, {}] | points:\\n
-"""
 
 
 @pytest.mark.parametrize(("name", "each", "pattern", "head"), rows(PATTERNS))
@@ -141,25 +128,6 @@ def test_camel_case_point_names(tmp_path, plain):
     assert found == plain
 
 
-EXPLORER = """type: macpherson
-units: millimeters
-hardpoints:
-  lower_wishbone_inboard_front: {x: 250, y: 400, z: 200}
-  lower_wishbone_inboard_rear: {x: -250, y: 450, z: 200}
-  lower_wishbone_outboard: {x: 0, y: 900, z: 200}
-  strut_top: {x: -40, y: 700, z: 850}
-  strut_bottom: {x: -14, y: 830, z: 427.5}
-  trackrod_inboard: {x: 50, y: 200, z: 250}
-  trackrod_outboard: {x: 150, y: 800, z: 275}
-  axle_inboard: {x: -20, y: 800, z: 300}
-  axle_outboard: {x: -20, y: 950, z: 300}
-config:
-  wheel:
-    offset: 40
-    tire: {aspect_ratio: 0.55, section_width: 270, rim_diameter: 13}
-"""
-
-
 def test_wheel_of_hub_offset_and_tire(tmp_path):
     """The offset is inboard; the radius is half the rim in inches and the height of the tire."""
     pytest.importorskip("yaml")
@@ -187,27 +155,6 @@ TEXTS = {
     "tree": json.dumps(tree()),
     "list": json.dumps(LISTED),
 }
-FAULTS = """
-two numbers | car.csv | rows | ,-611.75 | ,-611,75 | line 26 ... 2 numbers
-no z | car.csv | rows | wheel_center_z,228.25\\n | | wheel_center without z
-twice | car.csv | rows | | lca_front_x,1\\n | lca_front x: given before, in line 1
-two units | car.csv | rows and units | 228.25;mm | 228.25;m
-    | line 27 ... 'm', and 'mm' above ... one unit
-two points | car.csv | | | -89.75,-259.75,285.25\\n0,1,2 | line 1 ... expected the head
-four numbers | car.csv | | | uca_front,1,2,3,4\\nuca_rear,1,2,3,4 | line 1 ... expected the head
-two heads | car.csv | table | uca_rear | name,x,y,z\\nuca_rear | line 3 ... a second head
-twice in a script | car.m | script | | lca_front = [1, 2, 3];\\n | given before, in line 1
-two units in a script | car.m | units in remarks | | a = [1 2 3]; % [in]\\n
-    | line 2 ... 'mm', and 'inch' above
-an expression | car.m | script | 228.25 | r/2 | missing wheel_center
-twice in a tree | car.json | list | lca_front | uca_front | uca_front: given before
-no z in a tree | car.json | tree | , "z": 228.25 | | wheel_center without z
-a word | car.json | tree | {"x": 0.25, "y": -611.75, "z": 228.25} | [1, 2, "three"]
-    | missing wheel_center
-no points | car.yaml | | | a: 1\\nb: [1, 2]\\n | found no point ... beside a URDF
-a key twice | car.yaml | | | a: [1, 2, 3]\\na: [1, 2, 3]\\n | 'a' is given twice
-a reference | car.yaml | | | a: &b [1, 2, 3]\\nc: *b\\n | expected none
-"""
 
 
 @pytest.mark.parametrize(("name", "form", "old", "new", "message"), rows(FAULTS))

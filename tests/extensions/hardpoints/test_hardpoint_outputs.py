@@ -10,8 +10,11 @@ from kincheck.core.errors import CaseError
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 
 from ...support.case_texts import complains, rows, supplied, write
+from ...support.examples import examples
 from ...support.rods_of_templates import CLOSE, DATA, RODS, expected, solved
 from ...support.written_again import written_again
+
+(FAULTS,) = examples(__file__, "faults")
 
 
 def sample(folder, name, travel="0.05:11", extra=""):
@@ -44,20 +47,6 @@ def test_road_outputs_need_wheel_radius():
     assert "--wheel-radius" in case.source
     track = next(each for each in case.outputs if each.name == "half_track_change")
     assert track.at == "wheel_center"
-
-
-FAULTS = """
-angle | wheel_radius=30deg | | --wheel-radius ... '30deg' ... a length
-radius in mm | wheel_radius=300 |
-    | --wheel-radius ... 300 m ... 0.02 to 3 m ... say its unit: 300mm
-negative radius | wheel_radius=-0.3 | | found -0.3 m ... Correct it
-wheelbase in mm | wheelbase=2600 | | --wheelbase ... 0.1 to 20 m ... 2600mm
-height in mm | cg_height=500 | | --cg-height ... 0.005 to 6 m ... 500mm
-rack in mm | rack_per_turn=50 | | --rack-per-turn ... 0.001 to 1 m ... 50mm
-radius and contact | wheel_radius=0.3 | wheel_contact,0,612,0 | --wheel-radius ... wheel_contact
-contact at centre | | wheel_contact,0,612,220 | wheel_contact ... 0.008 m
-axis inboard | | wheel_axis,0,412,228 | wheel_axis ... inboard ... Mirror
-"""
 
 
 @pytest.mark.parametrize(("options", "extra", "message"), rows(FAULTS))

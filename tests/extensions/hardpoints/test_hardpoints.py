@@ -14,7 +14,12 @@ from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 from kincheck.core.kinematics import solve
 
 from ...support.case_texts import complains, rows, supplied, write
+from ...support.examples import examples
 from ...support.rods_of_templates import CLOSE, DATA, carrier_of
+
+CHRONO_FAULTS, ADAMS_FAULTS, TABLE_FAULTS, TABLE = examples(
+    __file__, "chrono_faults", "adams_faults", "table_faults", "table"
+)
 
 CHRONO = ("macpherson_strut", "double_wishbone", "multi_link", "sedan_double_wishbone")
 ADAMS = DATA / "adams_front_suspension.sub"
@@ -173,17 +178,6 @@ def test_template_roles_are_consistent(template):
 
 
 WISHBONE = "double_wishbone"
-TABLE = """name,x,y,z
-lca_front,67,-400,180
-lca_outer,267,-750,130
-lca_rear,467,-450,185
-tierod_inner,467,-400,330
-tierod_outer,417,-750,330
-uca_front,367,-450,555
-uca_outer,307,-675,555
-uca_rear,517,-490,560
-wheel_center,267,-760,330
-"""
 WHOLE = "template=double_wishbone units=mm axes=adams"
 
 
@@ -199,24 +193,6 @@ def edited(tmp_path, source, *edits):
     return file
 
 
-CHRONO_FAULTS = """
-cut | Location Chassis Front | Loc | not valid JSON
-misspelt | "Location Upright": [-0.02 | "Location Uprihgt": [-0.02
-    | lca_outer ... Control Arm/Location Uprihgt
-no list | [0.22, 0.52, -0.156] | 0.22
-    | Control Arm/Location Chassis Front ... 0.22 ... three numbers
-two numbers | [0.22, 0.52, -0.156] | [0.22, 0.52]
-    | Control Arm/Location Chassis Front ... three numbers
-text | [0.22, 0.52, -0.156] | [0.22, 0.52, "low"]
-    | Control Arm/Location Chassis Front ... 'low' ... coordinate
-no suspension | "Type": "Suspension" | "Type": "Steering" | Type ... Steering ... Suspension
-other template | "MacPhersonStrut" | "SolidAxle"
-    | Template ... SolidAxle ... mcpherson, double_wishbone,  ... five_link, three_link
-template no text | "MacPhersonStrut" | 7 | Template ... 7 ... name
-millimetres | 0.22, 0.52, -0.156 | 220.0, 520.0, -156.0 | span ... another unit
-"""
-
-
 @pytest.mark.parametrize(("old", "new", "message"), rows(CHRONO_FAULTS))
 def test_chrono_file_faults(tmp_path, old, new, message):
     file = edited(tmp_path, STRUT, (old, new))
@@ -225,69 +201,9 @@ def test_chrono_file_faults(tmp_path, old, new, message):
     complains(file, message, Supplied(ask_names=True))
 
 
-ADAMS_FAULTS = """
-no units | LENGTH  =  'mm' | | does not say in which unit ... --units mm or --units m
-unknown unit | 'mm' | 'furlong' | unit ... furlong ... mm
-cut row | -750.0      130.0 | -750.0 | line 17 ... found 4 fields ... expected 5
-no number | -750.0      130.0 | -750.0      13O.0 | line 17 ... lca_outer ... z_value ... '13O.0'
-digit separators | -750.0      130.0 | -750.0      1_30.0
-    | line 17 ... lca_outer ... z_value ... '1_30.0'
-unknown side | 'left/right  '    267.0 | 'lift/right  '    267.0
-    | line 17 ... lca_outer ... 'lift/right' ... 'left/right'
-twice | 'lca_rear | 'lca_front | line 18 ... lca_front ... line 16 ... expected once
-misspelt | 'uca_rear | 'uca_raer | uca_rear ... 'uca_raer' ... line 23 ... is it
-no block | [HARDPOINT] | [HARDPIONT] | no row in a block [HARDPOINT]
-other columns | x_value    y_value | x_value    r_value | line 15 ... r_value
-"""
-
-
 @pytest.mark.parametrize(("old", "new", "message"), rows(ADAMS_FAULTS))
 def test_adams_hardpoint_faults(tmp_path, old, new, message):
     complains(edited(tmp_path, ADAMS, (old, new)), message, Supplied(WISHBONE, ask_names=True))
-
-
-TABLE_FAULTS = """
-no unit | | | units= | --units mm: ... from the middle ... Add: --units mm
-no axes | | | axes= | is the outermost ... Add: --axes rearward,right,up
-no template | | | template= ask_names=yes
-    | --template ... mcpherson, double_wishbone,  ... five_link, three_link
-no template, and names that fit none | uca_outer | my_point | template=
-    | --template double_wishbone ... uca_outer is my_point ... Add: --template double_wishbone --n
-neither unit nor axes | | | units= axes= | Add: --units mm --axes rearward,right,up
-misspelt template | | | template=duoble_wishbone
-    | --template ... 'duoble_wishbone' ... 'double_wishbone'
-wrong template | | | template=mcpherson | template mcpherson: missing strut_lower ... uca_front
-misspelt unit | | | units=milimetre | --units ... 'milimetre'
-wrong unit | | | units=m | span ... expected a suspension
-misspelt axes | | | axes=rearward,rihgt,up | --axes ... rihgt ... left or right
-axes twice | | | axes=left,right,up | --axes ... one each
-mirrored | | | axes=rearward,left,up
-    | wheel_center ... y = -760 ... expected the left side ... --axes
-backwards | | | axes=forward,right,up | uca_front ... uca_rear ... in front of that ... --axes
-upside down | | | axes=rearward,right,down | uca_outer ... lca_outer ... expected it above
-travel | | | travel=5deg | --travel ... '5deg' ... a length
-separated travel | | | travel=0.0_5 | --travel ... '0.0_5' ... a length
-many samples | | | travel=0.05:1000000000 | LENGTH:SAMPLES, 2 to 1000000 of them
-one sample | | | travel=0.05:1 | LENGTH:SAMPLES, 2 to 1000000 of them
-no travel | | | travel=0 | --travel ... '0' ... a length
-drive | | | drive=a:0:1 | --drive ... hardpoint table
-cut row | 417,-750,330 | 417,-750 | | line 6 ... found 3 fields ... expected 4
-no number | 417,-750,330 | 417,-75O,330 | | line 6 ... tierod_outer ... y ... '-75O'
-digit separators | 417,-750,330 | 417,-7_50,330 |
-    | line 6 ... tierod_outer ... y ... '-7_50' ... Correct
-other digits | 417,-750,330 | 417,-７５０,330 | | line 6 ... tierod_outer ... y ... '-７５０'
-not finite | 417,-750,330 | 417,nan,330 | | line 6 ... tierod_outer ... 'nan'
-twice | lca_rear | lca_front | | line 4 ... lca_front ... line 2
-two for one | lca_rear | wheel | | wheel_center ... 'wheel' (line 4) ... 'wheel_center' (line 10)
-misspelt | lca_rear | lca_raer | ask_names=yes
-    | lca_rear, the lower arm's rear pivot ... is it 'lca_raer', line 4?
-no head | name,x,y,z\\n | 1,2,3,4,5\\n | | line 1 ... expected the head name,x,y,z
-two units | name,x,y,z | name,x [mm],y [mm],z [m] | | line 1 ... one unit
-unit contradicts | name,x,y,z | name,x [m],y [m],z [m] | | --units ... found mm ... in m
-remark contradicts | name,x,y,z | # units: m\\nname,x [mm],y [mm],z [mm] |
-    | line 2 ... in mm, and m
-no name | lca_rear | | | line 4 ... Name the point
-"""
 
 
 @pytest.mark.parametrize(("old", "new", "options", "message"), rows(TABLE_FAULTS))

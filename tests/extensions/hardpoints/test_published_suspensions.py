@@ -15,7 +15,10 @@ from scipy.optimize import brentq, least_squares
 
 from ...oracles.rods import rotation
 from ...support.case_texts import rows
+from ...support.examples import examples
 from ...support.rods_of_templates import CLOSE, DATA, expected, solved
+
+SAME, STRUT = examples(__file__, "same", "strut")
 
 # A tyre 270/55 on a 13 inch rim: 0.5 * 13 * 25.4 + 0.55 * 270 mm.
 RADIUS = 0.3136
@@ -46,19 +49,6 @@ DEGREE, MM = np.pi / 180.0, 1e-3
 # and wheel_travel). The slopes of all these curves by either are below 0.4 degrees/mm and 1 mm/mm,
 # those of the slopes below 0.01 degrees/mm^2; five such errors are allowed.
 ANGLE, LENGTH, SLOPE = 5 * 0.4 * 3e-6 * DEGREE, 5 * 3e-6 * MM, 5 * 0.01 * 3e-6 * DEGREE / MM
-SAME = """
-toe_angle | toe | angle
-caster | caster | angle
-kpi | kingpin_inclination | angle
-steering_axis_offset_ground | scrub_radius | length
-mechanical_trail | mechanical_trail | length
-wheel_center_x | wheel_center.x | length
-wheel_center_y | wheel_center.y | length
-deriv_toe_angle_wrt_hub_z | toe.per_travel | slope
-deriv_caster_wrt_hub_z | caster.per_travel | slope
-deriv_kpi_wrt_hub_z | kingpin_inclination.per_travel | slope
-deriv_half_track_wrt_hub_z | half_track_change.per_travel | ratio
-"""
 UNITS = {
     "angle": (DEGREE, ANGLE),
     "length": (MM, LENGTH),
@@ -151,20 +141,6 @@ def test_formula_student_pushrod_corner():
         assert found["spring_ratio"][k] == pytest.approx(-rate, abs=1e-8)
 
 
-STRUT = """# template: mcpherson
-# units: m
-# axes: rearward,left,up
-name,x,y,z
-lca_front,1.07,0.353,0.005
-lca_rear,1.27,0.353,0.005
-lca_outer,0.9676,0.66,-0.01
-strut_lower,0.97772,0.605,0.18
-strut_upper,1.0,0.55,0.6
-tierod_inner,1.14,0.355,0.1455
-tierod_outer,1.115,0.665,0.118
-wheel_center,0.975,0.715,0.101
-"""
-"""Points of the built-in case mcpherson_suspension, mirrored to the left by their axes."""
 ROAD = ("scrub_radius", "mechanical_trail", "roll_center_height", "half_track_change")
 
 

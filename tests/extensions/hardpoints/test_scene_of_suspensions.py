@@ -18,29 +18,19 @@ from msgspec.structs import replace
 
 from ...oracles.naive import A
 from ...report.test_report_scene import AXIS, STRUT, UP
+from ...support.examples import examples
 from ...support.mechanisms import chain
 from ...support.strut_results import GRID, record, results, series
 
+(AXES,) = examples(__file__, "axes")
 
-@pytest.mark.parametrize(
-    ("driver", "up", "name"),
-    [
-        (UP | {"direction": [0, 0, 2]}, 1, "wheel travel"),
-        (UP | {"direction": [0, 0, -1]}, -1, "wheel travel"),
-        (UP | {"direction": [0, 0, 1], "point": "tip"}, 1, "lift"),
-        (UP | {"direction": [0, 0, 1], "relative": False}, 1, "lift"),
-        (UP | {"direction": [0, 1, 1]}, 0, "lift"),
-        (UP | {"direction": [1, 0, 0]}, 0, "lift"),
-        ({"name": "lift", "type": "joint_displacement"}, 0, "lift"),
-        ({"name": "lift", "type": "joint_angle"}, 0, "lift"),
-    ],
-    ids=["up", "down", "point", "absolute", "aslant", "level", "slide", "angle"],
-)
+
+@pytest.mark.parametrize(("driver", "up", "name"), AXES.values(), ids=AXES)
 def test_travel_axis_of_vertical_driver(driver, up, name):
     made = record(
         "strut", "closed_form", "one", 0.0, GRID, driver={"lift": GRID}, outputs={"x": series(GRID)}
     )
-    axis: Axis = driver_axis({"driver": driver}, [made], [])
+    axis: Axis = driver_axis({"driver": UP | driver}, [made], [])
     assert (axis.up, axis.name) == (up, name)
 
 

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.hardpoints.shims import shims
@@ -13,44 +12,7 @@ from kincheck.core.extensions.hardpoints.suspension import Convention, Side, Veh
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES
 
 from ...oracles.rods import rotation
-from ...support.rods_of_templates import RODS, solved
-
-
-def write_table(folder, name, toe, camber, moved):
-    """Write the sample table of a template, x rearward and y right; return the wheel's axis."""
-    spin = np.array(
-        [math.sin(toe) * math.cos(camber), math.cos(toe) * math.cos(camber), -math.sin(camber)]
-    )
-    sample = dict(TEMPLATES[name].sample)
-    sample["wheel_axis"] = tuple((np.array(sample["wheel_center"]) + 0.2 * spin).tolist())
-    for role, shift in moved.items():
-        sample[role] = tuple((np.array(sample[role]) + shift).tolist())
-    lines = ["# units: m", "# axes: rearward,right,up", f"# template: {name}", "name,x,y,z"]
-    lines += [f"{role},{-x!r},{-y!r},{z!r}" for role, (x, y, z) in sample.items()]
-    (folder / "car.csv").write_text("\n".join(lines) + "\n")
-    return spin
-
-
-@pytest.mark.parametrize("name", [name for name, rods in RODS.items() if len(rods) > 2])
-def test_tie_rod_moves_cancel_bump_steer(tmp_path, name):
-    def bump_steer(moved):
-        write_table(tmp_path, name, 0.01, -0.03, moved)
-        return solved(load(tmp_path / "car.csv", Supplied(travel="0.01:3")))["toe.per_travel"][1]
-
-    write_table(tmp_path, name, 0.01, -0.03, {})
-    ends = {each.roles[0]: each for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
-    found = {
-        role: each.no_bump_steer for role, each in ends.items() if each.no_bump_steer is not None
-    }
-    assert found.keys() == {*RODS[name][-1]}
-    before = abs(bump_steer({}))
-    for role, moves in found.items():
-        for k, sign in enumerate((-1.0, -1.0, 1.0)):
-            # metres of travel by round-off of the pose; moves of a metre leave long rods
-            assert abs(bump_steer({role: sign * moves[k] * np.eye(3)[k]})) < 1e-9 * before, (
-                role,
-                k,
-            )
+from ...support.rods_of_templates import RODS
 
 
 @pytest.mark.parametrize("name", [name for name, rods in RODS.items() if len(rods) == 5])

@@ -11,19 +11,11 @@ from kincheck.core.extensions.hardpoints.reader import read_hardpoints
 from kincheck.core.extensions.hardpoints.saving import free_name, save_table
 from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 
+from ...support.examples import examples
 from ...support.written_again import written_again
 
-POINTS = {
-    "uca_front": (90.25, 260.0, 285.0),
-    "uca_rear": (-110.0, 265.5, 280.0),
-    "uca_outer": (-15.0, 540.0, 312.0),
-    "lca_front": (120.0, 210.0, 125.0),
-    "lca_rear": (-130.0, 215.0, 120.0),
-    "lca_outer": (5.0, 575.0, 118.0),
-    "tierod_inner": (70.0, 220.0, 150.0),
-    "tierod_outer": (75.0, 560.0, 148.0),
-    "wheel_center": (0.0, 612.0, 228.0),
-}
+(POINTS,) = examples(__file__, "points")
+
 HEAD = ["# template: double_wishbone", "# units: mm", "# axes: forward,left,up"]
 
 

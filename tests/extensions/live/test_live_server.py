@@ -36,11 +36,10 @@ from kincheck.core.extensions.measured.reference_curve import CurveOptions, with
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from ...oracles.naive import A
 from ...support.examples import examples
 from .conftest import CAR, TRAVEL, Page, page_of
 
-(REQUESTS,) = examples(__file__, "requests")
+TYPED, VARY, REQUESTS = examples(__file__, "typed", "vary", "requests")
 
 
 def status(server, path, method="GET", **headers):
@@ -59,10 +58,7 @@ def test_server_listens_on_loopback(served):
     assert served.listener.socket.getsockname()[0] == "127.0.0.1"
 
 
-@pytest.mark.parametrize(
-    ("path", "header", "expected"),
-    REQUESTS,
-)
+@pytest.mark.parametrize(("path", "header", "expected"), REQUESTS)
 def test_request_without_token_is_refused(served, path, header, expected):
     headers = dict([header.split()] if header else [])
     assert status(served, path.format(token=served.token), **headers)[0] == expected
@@ -223,17 +219,7 @@ def test_live_case_follows_page(car):
     server.close()
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("nan", "found 'nan', expected a coordinate. Correct the number"),
-        ("1e400", "found '1e400', expected a coordinate. Correct the number"),
-        ("", "found '', expected a coordinate. Correct the number"),
-        ("12 mm", "Leave the unit out, and state it in the head or by --units"),
-        ("1 200", "Remove the separators of thousands"),
-        ("=A1", "Write the value of the formula"),
-    ],
-)
+@pytest.mark.parametrize(("text", "told"), TYPED)
 def test_typed_text_message_equals_file(page, car, text, told):
     message = page.refusal(type="read", point="uca_outer", axis="y", text=text)
     assert told in message
@@ -378,27 +364,6 @@ def test_slider_pose_closes_loops(tmp_path):
     assert found.drivers[driver.name] == pytest.approx(driver.design + 0.3, abs=1e-12)
 
 
-def test_slider_reactions_equal_run(tmp_path):
-    case = load("mcpherson_strut_loaded")
-    live = LiveModel(tmp_path / "strut", case)
-    (driver,) = live.drivers.values()
-    found = live.move(Move(drivers={driver.name: driver.design + 0.02}, measured=True))
-    force = np.array(found.reactions["tie_rod"])
-    assert found.outputs["tie_rod_force_y"] == force[1]
-    sweep = replace(case.sweep, values=np.array([0.0, 0.02]), rate=0.0)
-    (record,) = run(replace(case, sweep=sweep, reference={}), "native").records
-    assert force[1] == pytest.approx(record.outputs["tie_rod_force_y"].position[-1], rel=1e-9)
-    # a rod pulls along itself
-    r, p = np.array(found.bodies["knuckle"][:3]), np.array(found.bodies["knuckle"][3:])
-    (knuckle,) = (body for body in case.mechanism.moving if body.name == "knuckle")
-    joint = case.mechanism.joint("tie_rod")
-    ends = dict(zip(joint.bodies, joint.points, strict=True))
-    arm = A(np.array(knuckle.euler_parameters)).T @ (np.array(ends["knuckle"]) - knuckle.origin)
-    rod = r + A(p) @ arm - np.array(ends["rack"])
-    assert np.cross(force, rod) == pytest.approx([0.0] * 3, abs=1e-9 * np.abs(force).max())
-    assert live.move(Move(drivers={})).reactions == {}
-
-
 def test_open_loop_is_reported(tmp_path):
     case = load("rssr")
     joints = [
@@ -499,21 +464,6 @@ def test_axle_edit_divides_no_step(car, monkeypatch, axle, travel, whole):
 
 
 RIG = "# signs: iso8855\ntravel [mm],Toe Angle [deg]\n-30,0.22\n0,0.01\n30,-0.18\n"
-VARY = """\
-schema = "kincheck-vary/1"
-mode = "monte_carlo"
-
-[units]
-length = "mm"
-angle = "deg"
-
-[hardpoints.tie]
-at = "tierod_outer"
-sigma = 0.5
-
-[limits.toe]
-high = 0.3
-"""
 
 
 def test_live_reference_has_tolerance(car, tmp_path):

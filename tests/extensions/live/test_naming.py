@@ -13,8 +13,11 @@ from kincheck.core.extensions.live.naming import naming_of
 from kincheck.core.extensions.live.server import LiveServer
 
 from ...support.case_texts import write
+from ...support.examples import examples
 from ..hardpoints.test_guess import RACE, places, plain, rows
 from .conftest import ASKED, TOLD, page_of
+
+(IMPOSSIBLE,) = examples(__file__, "impossible")
 
 TEXT = "name;x;y;z\n" + rows("numbers", "P{};{};{};{}")
 TRUE = {role: f"P{k}" for k, role in enumerate(RACE, 1)}
@@ -57,14 +60,7 @@ def test_python_asks_for_names(tmp_path):
         kincheck.live(write(tmp_path, TEXT, "car.csv"))
 
 
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"tierod_inner": ""}, "Choose a point for tierod_inner"),
-        ({"tierod_inner": "Q"}, "no role or point 'Q'"),
-        ({"uca_front": "P2", "uca_rear": "P1"}, "in front of that"),
-    ],
-)
+@pytest.mark.parametrize(("changed", "message"), IMPOSSIBLE)
 def test_answers_that_cannot_be(server, tmp_path, changed, message):
     with page_of(server) as socket:
         ask(socket)

@@ -8,6 +8,9 @@ import pytest
 from kincheck.core.cli.main import main
 
 from ...support.crank import MECHANISM
+from ...support.examples import examples
+
+FAILING, CRANK = examples(__file__, "failing", "crank")
 
 CASE = f"""{MECHANISM}[sweep]
 driver = "turn"
@@ -15,20 +18,6 @@ start = -1.0
 stop = 1.0
 steps = 21
 rate = 2.0
-"""
-CRANK = r"""
-#include <math.h>
-#include <stdio.h>
-int main(int argc, char **argv) {
-  FILE *in = fopen(argv[1], "r"), *out = fopen(argv[2], "w");
-  double t, x, v, a;
-  fscanf(in, "%*[^\n]");
-  fprintf(out, "tip.x,tip.x.velocity,tip.x.acceleration,tip.y [mm]\n");
-  while (fscanf(in, "%lf,%lf,%lf,%lf", &t, &x, &v, &a) == 4)
-    fprintf(out, "%.17g,%.17g,%.17g,%.17g\n", 0.5 * cos(x), -0.5 * sin(x) * v,
-            -0.5 * cos(x) * v * v - 0.5 * sin(x) * a, 500.0 * sin(x));
-  return 0;
-}
 """
 POSES = """
 import csv, math, sys
@@ -99,16 +88,7 @@ sys.exit(3)
     assert (record["outcome"], record["message"]) == ("unsupported", "crank refuses the case")
 
 
-@pytest.mark.parametrize(
-    ("program", "text"),
-    [
-        ("import os\nos.kill(os.getpid(), 11)", "ended by signal SIGSEGV"),
-        ("import sys\nsys.exit('no solver')", "ended with status 1: no solver"),
-        ("pass\n", "wrote no {out}"),
-        ("import sys\nopen(sys.argv[2], 'w').write('tip.x\\n1\\n')", "out.csv: found 1 rows"),
-        ("import sys\nopen(sys.argv[2], 'w').write('a\\n1\\n')", "out.csv: found the columns 'a'"),
-    ],
-)
+@pytest.mark.parametrize(("program", "text"), FAILING)
 def test_failing_program_is_an_error(judged, program, text):
     _, record = judged(program)
     assert record["outcome"] == "error"

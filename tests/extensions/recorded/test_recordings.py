@@ -15,6 +15,9 @@ from kincheck.adapters import engine
 from scipy.io import savemat
 
 from ...support.case_texts import write
+from ...support.examples import examples
+
+(GEARS,) = examples(__file__, "gears")
 
 DATA = Path(__file__).parents[2] / "data" / "recordings"
 NATIVE = engine("native")
@@ -434,42 +437,6 @@ def test_even_driver_values_are_exact(judged, tmp_path):
         assert judged(file, "--accuracy", "JOINT_4.angle=1e-8 rad")[0] == status
 
 
-GEARS = """schema = "kincheck-case/1"
-name = "gears"
-source = "made up for this test"
-[bodies.a]
-[bodies.b]
-origin = [0.3, 0, 0]
-[joints.pin]
-type = "revolute"
-bodies = ["ground", "a"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[joints.other]
-type = "revolute"
-bodies = ["ground", "b"]
-point = [0.3, 0, 0]
-axis = [0, 0, 1]
-[couplers.mesh]
-type = "gear"
-joints = ["pin", "other"]
-ratio = -0.4
-[points.tip]
-body = "b"
-position = [0.4, 0, 0]
-[drivers.turn]
-type = "joint_angle"
-joint = "pin"
-[sweep]
-driver = "turn"
-start = 0
-stop = 12
-steps = 61
-[outputs.x]
-point = "tip"
-component = "x"
-relative = false
-"""
 HINGE = 'type = "revolute"\nbodies = ["ground", "b"]'
 RACK = GEARS.replace(HINGE, HINGE.replace("revolute", "translational")).replace("ratio = -0.4", "")
 RACK = RACK.replace('type = "gear"', 'type = "rack_pinion"\nradius = 0.05')

@@ -16,9 +16,12 @@ from kincheck.core.extensions.same.undriven import undriven_case, undriven_file
 from kincheck.core.extensions.same.verdict import compare
 
 from ...support.case_texts import write
+from ...support.examples import examples
 from ...support.model_files import driven
 from ...support.written_mechanisms import CASES, case
 from . import converters
+
+(SLIDER,) = examples(__file__, "slider")
 
 LIMIT = '<limit lower="-0.2" upper="0.8" effort="5" velocity="2"/>'
 MIMIC = '<mimic joint="left" multiplier="-1" offset="0.02"/>'
@@ -235,20 +238,6 @@ def test_exported_coupling_offset_moves_zero(tmp_path, capsys):
     capsys.readouterr()
     assert main(["same", str(file), str(written)]) == 0
     assert "zero of second: moved by -0.1 rad in written.urdf" in capsys.readouterr().out
-
-
-SLIDER = """<sdf version="1.9"><model name="ram">
-<link name="boom"><inertial><mass>2</mass></inertial></link>
-<link name="rod"><pose>1 0 0.1 0 0 0</pose><inertial><mass>1</mass></inertial></link>
-<link name="barrel"><pose>0.5 0 -0.4 0 0 0</pose><inertial><mass>1</mass></inertial></link>
-<joint name="boom_pin" type="revolute"><parent>world</parent><child>boom</child>
-<axis><xyz>0 1 0</xyz></axis></joint>
-<joint name="rod_pin" type="revolute"><parent>boom</parent><child>rod</child>
-<axis><xyz>0 1 0</xyz></axis></joint>
-<joint name="barrel_pin" type="revolute"><parent>world</parent><child>barrel</child>
-<axis><xyz>0 1 0</xyz></axis></joint>
-<joint name="ram" type="prismatic"><parent>barrel</parent><child>rod</child>
-<axis><xyz>1 0 1</xyz></axis></joint></model></sdf>"""
 
 
 def test_same_with_loops_opened_elsewhere(tmp_path, capsys):

@@ -17,59 +17,9 @@ from scipy.optimize import brentq
 from ...support.examples import examples
 from ...support.fakes import record_of
 
-(PARALLEL,) = examples(__file__, "parallel")
+ARM, SWEEP, TURNED, PARALLEL = examples(__file__, "arm", "sweep", "turned", "parallel")
 
 G = 9.81
-ARM = """
-schema = "kincheck-case/1"
-name = "arm"
-source = "made"
-gravity = [0.0, 0.0, -9.81]
-[bodies.arm]
-euler_parameters = [0.5, 0.5, 0.5, 0.5]
-mass = 2.0
-center_of_mass = [0.2, 0.0, 0.0]
-inertia = [0.001, 0.02, 0.02, 0.0, 0.0, 0.0]
-[bodies.hand]
-mass = 1.0
-center_of_mass = [0.5, 0.0, 0.0]
-inertia = [0.001, 0.01, 0.01, 0.0, 0.0, 0.0]
-[joints.shoulder]
-type = "revolute"
-bodies = ["ground", "arm"]
-point = [0.0, 0.0, 0.0]
-axis = [0.0, 1.0, 0.0]
-[joints.elbow]
-type = "revolute"
-bodies = ["arm", "hand"]
-point = [0.4, 0.0, 0.0]
-axis = [0.0, 1.0, 0.0]
-[points.tip]
-body = "hand"
-position = [0.6, 0.0, 0.0]
-[drivers.lift]
-type = "joint_angle"
-joint = "shoulder"
-[drivers.bend]
-type = "joint_angle"
-joint = "elbow"
-[forces.coil]
-type = "torsion_spring_damper"
-joint = "shoulder"
-stiffness = 50.0
-damping = 30.0
-"""
-SWEEP = """
-[sweep]
-driver = "lift"
-start = -0.4
-stop = 0.4
-steps = 5
-rate = 0
-[drivers.bend.motion]
-type = "ramp"
-rate = 0.5
-"""
 EFFORTS = """
 [outputs.lift]
 type = "driver_effort"
@@ -338,31 +288,6 @@ def test_reaction_frames_and_moment_points(tmp_path):
         assert found["joint_z"] == pytest.approx(np.zeros(5), abs=1e-11)
         # the tip is 0.2 m beyond the elbow
         assert found["tip"] == pytest.approx(found["elbow"] + G * 0.2 * np.cos(turn), abs=1e-11)
-
-
-TURNED = """
-[bodies.beam]
-euler_parameters = [0.5, 0.5, 0.5, 0.5]
-mass = 2.0
-center_of_mass = [0.5, 0.0, 0.0]
-[joints.pin]
-type = "revolute"
-bodies = ["ground", "beam"]
-point = [0.0, 0.0, 0.0]
-axis = [0.0, 1.0, 0.0]
-[points.post]
-body = "ground"
-position = [0.25, 0.1, 0.3]
-[drivers.turn]
-type = "joint_angle"
-joint = "pin"
-[sweep]
-driver = "turn"
-start = 0.0
-stop = 0.6
-steps = 3
-rate = 0
-"""
 
 
 @pytest.mark.parametrize("engine", ["native", "mujoco", "exudyn"])

@@ -20,7 +20,7 @@ from kincheck.core.trajectory import QUANTITIES
 from ...support.fakes import Fake, crank, native_but, swept
 from ...support.variations import vary, vary_file
 from .test_sweep_command import POINTS
-from .test_sweep_study import PIVOT, STRUT, TIP
+from .test_sweep_study import PIVOT, TIP
 
 
 def deviating(variant, point, sample, name):
@@ -83,22 +83,6 @@ def test_impossible_sweep_check_is_refused(tmp_path):
             sweep_designs(
                 case, variation, samples=10, check=Check(engine, 1.0, solve_in_process, 1e-12)
             )
-
-
-def test_sweep_check_with_mujoco_agrees(tmp_path):
-    mujoco = adapters.engine("mujoco")
-    if mujoco.version() is None:
-        pytest.skip("mujoco is not installed")
-    case = load("mcpherson_suspension")
-    found = sweep_designs(
-        case,
-        vary(tmp_path, case, **STRUT),
-        samples=200,
-        seed=6,
-        check=Check(mujoco, 0.02, solve_in_process, 1e-12),
-    )
-    assert len(found.checked) == 4
-    assert found.deviating == []
 
 
 def test_sweep_check_deviation_can_be_replayed(tmp_path, capsys, monkeypatch, instead):

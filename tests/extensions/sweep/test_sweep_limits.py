@@ -20,13 +20,12 @@ from kincheck.core.errors import KincheckError
 from kincheck.core.extensions.sweep.conformance import sparkline
 from kincheck.core.extensions.sweep.cross_check import Check
 from kincheck.core.extensions.sweep.page import page
-from kincheck.core.extensions.sweep.study import Ready, RowLimit, Study, limit_counts
+from kincheck.core.extensions.sweep.study import RowLimit, limit_counts
 from kincheck.core.extensions.sweep.study_choices import Incomplete, Sampling
 from kincheck.core.extensions.sweep.sweep import sweep_designs
 from kincheck.core.extensions.sweep.tables import limit_notes, limits_csv, print_sweep, remarks
 from kincheck.core.extensions.sweep.variation import FileUnits, Limit
-from kincheck.core.extensions.sweep.variation_file import limits_of_texts, read_variation
-from kincheck.core.harness.compare import output_series
+from kincheck.core.extensions.sweep.variation_file import limits_of_texts
 from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Distance, Revolute
@@ -413,25 +412,7 @@ def test_sweep_command_counts_incomplete_variants(tmp_path, capsys, option, judg
 # Studies of forces: against runs of single variants, by both ways; masses and loads vary
 
 
-COUNT = 4
 # The rows of the slider-crank are redundant: some components are not determined.
-
-
-@pytest.mark.parametrize("name", LOADED)
-def test_sweep_forces_equal_single_variants(tmp_path, name):
-    case, native = load(name), adapters.engine("native")
-    ready = Ready.of(Study(case, vary(tmp_path, case, **LOADED[name]), COUNT, 3))
-    study = ready.study
-    found, solved, _, messages = ready.values(study.variation.offsets(3, 0, COUNT))
-    assert solved.all(), messages
-    assert any(row.output.forces for row in study.rows)
-    for index in range(COUNT):
-        own = study.of_variant(index)
-        motion = native.solve(native.build(own), own, 1e-12)
-        right = np.array([output_series(own, row.output, motion).position for row in study.rows])
-        scale = np.nanmax(np.abs(right), axis=1, keepdims=True)
-        np.testing.assert_allclose(found[:, :, index] / scale, right / scale, atol=1e-12)
-    assert not np.isclose(found[:, :, 0], found[:, :, 1], rtol=1e-6).all(axis=1).any()
 
 
 def test_units_of_varied_stiffness_and_mass(tmp_path):
@@ -472,16 +453,3 @@ def test_force_study_is_linear_in_mass(tmp_path):
     size = np.abs(torque.nominal).max()
     np.testing.assert_allclose(torque.min, ends.min(axis=0), atol=1e-9 * size)
     np.testing.assert_allclose(torque.max, ends.max(axis=0), atol=1e-9 * size)
-
-
-def test_force_study_prints_file_units(tmp_path, capsys):
-    hardpoints = {"mass": {"at": "bodies.slider.mass", "half_width": 0.1}}
-    path = vary_file(tmp_path, hardpoints, limits={"crank_torque": {"high": 1e9}})
-    case = load("planar_slider_crank")
-    (limit,) = read_variation(path, case).limits
-    assert limit.high == pytest.approx(1e6)  # N mm in the file
-    assert main(f"sweep planar_slider_crank --vary {path} --samples 8".split()) == 0
-    output = capsys.readouterr()
-    assert "crank_torque" in output.out
-    assert "N mm" in output.out
-    assert "left out" not in output.err

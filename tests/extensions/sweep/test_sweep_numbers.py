@@ -14,13 +14,12 @@ from kincheck.core.extensions.sweep.variation_file import read_variation
 from kincheck.core.harness.record import to_json
 
 from ...report.page import Page
+from ...support.examples import examples
 from ...support.printed import assert_printed, assert_row, blocks, cells_of
 from ...support.variations import vary_file
 
-VARIED = {
-    "ball": {"at": "ball", "sigma": 2.0},
-    "rod": {"at": "joints.tie_rod.points.0", "half_width": [1.0, 0, 3.0]},
-}
+(VARIED,) = examples(__file__, "varied")
+
 LIMITS = {"half_track_change": {"low": -11.0, "high": 0.05}, "wheelbase_change": {"high": 3.9}}
 # enough for the index by quantiles, in two processes
 SAMPLES, JOBS = 800, 2

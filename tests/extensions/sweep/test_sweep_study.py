@@ -5,19 +5,15 @@ from dataclasses import replace
 from io import StringIO
 from itertools import pairwise
 
-import kincheck
-import kincheck.adapters
-import kincheck.core
 import msgspec
 import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import SolveError, solve
-from kincheck.core.case.case import Output, without_forces
+from kincheck.core.case.case import without_forces
 from kincheck.core.case.measures import Component, JointAngle, JointDisplacement, Orientation
 from kincheck.core.case.quantity import where_moving, with_markers
 from kincheck.core.errors import KincheckError
-from kincheck.core.extensions.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.extensions.sweep.statistics import (
     QUANTILES,
     empty_summary,
@@ -31,7 +27,6 @@ from kincheck.core.extensions.sweep.sweep import sweep_designs
 from kincheck.core.extensions.sweep.tables import print_sweep, without_gradients
 from kincheck.core.extensions.sweep.variation import DRAWN, Law, Limit
 from kincheck.core.jet import Jet
-from kincheck.primitives import Dot10
 from scipy import stats
 
 from ...support.examples import examples
@@ -113,25 +108,6 @@ def test_stillness_is_judged_per_variant():
     one = np.ones((5, 2))
     fast = one * [1.0, 1e12]
     assert np.isnan(where_moving(Jet(one, one, one), (one, fast)).x).tolist() == [[False, True]] * 5
-
-
-def test_sweep_order_adds_derivatives(tmp_path):
-    case = crank()
-    variation = vary(tmp_path, case, tip=TIP)
-    assert list(sweep_designs(case, variation, samples=3, order=0).outputs) == ["x", "y"]
-    found = sweep_designs(case, variation, samples=200, order=2)
-    assert list(found.outputs) == [
-        "x",
-        "x.velocity",
-        "x.acceleration",
-        "y",
-        "y.velocity",
-        "y.acceleration",
-    ]
-    _, v, a = exact(case)
-    np.testing.assert_allclose(found.outputs["y.velocity"].nominal, v[:, 1], atol=1e-14)
-    np.testing.assert_allclose(found.outputs["x.acceleration"].nominal, a[:, 0], atol=1e-14)
-    assert found.outputs["y.acceleration"].unit == "m/s^2"
 
 
 def test_large_chunks_are_solved_in_parts(tmp_path):
@@ -282,40 +258,6 @@ def test_quantiles_and_standard_errors():
     some = quantiles([holes], exact=True).values
     np.testing.assert_allclose(some[:, 1], np.quantile(kept[1, 1::2], QUANTILES), rtol=1e-13)
     assert np.isnan(some[:, 2]).all()
-
-
-def rotated(axis, angle, arm, derivative=0):
-    """Rodrigues' formula, or a derivative of it by the angle, for complex numbers: an imaginary
-    step in them gives derivatives to round-off.
-    """
-    h, angle = axis / np.sqrt(axis @ axis), angle + 0.5 * np.pi * derivative
-    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    still = h * (h @ arm)
-    return (arm - still) * c + np.cross(h, arm) * s + (still if derivative == 0 else 0.0)
-
-
-def test_sweep_gradients_equal_closed_form(tmp_path):
-    """Of a crank and its rates by its tip and the components of its axis, at the samples and at
-    design.
-    """
-    case = crank()
-    case = replace(
-        case, outputs=(*case.outputs, Output("z", "tip", (0.0, 0.0, 1.0), False, 1e-9, 0.0, "test"))
-    )
-    variation = vary(
-        tmp_path, case, tip={"at": "tip", "sigma": 1}, axis={"at": "joints.pivot.axis", "sigma": 1}
-    )
-    found = gradients(Study(case, variation, 1, 0, order=2))
-    angle, rate = np.append(case.sweep.change, 0.0), case.sweep.rate
-    for k in range(6):
-        step = np.zeros(6, dtype=complex)
-        step[k] = 1e-30j
-        tip, axis = np.array([0.5, 0.0, 0.0]) + step[:3], np.array([0.0, 0.0, 1.0]) + step[3:]
-        at = [rate**n * rotated(axis, angle, tip, n) for n in range(3)]
-        at[0][:, 0] -= tip[0]
-        right = np.stack([at[n][:, c] for c in range(3) for n in range(3)]).imag / 1e-30
-        np.testing.assert_allclose(found.along[k], right[:, :-1], rtol=0, atol=1e-10)
-        np.testing.assert_allclose(found.design[k], right[:, -1], rtol=0, atol=1e-10)
 
 
 def test_coarse_variants_count_nominal_turns(tmp_path):
@@ -534,21 +476,3 @@ def test_impossible_samplings_are_refused(tmp_path):
     grid = vary(tmp_path, crank(), "grid", tip={"at": "tip", "values": [-1, 1]})
     with pytest.raises(KincheckError, match="--sampling latin: grid draws nothing"):
         grid.sampled(Sampling.LATIN, 8)
-
-
-VARY = """schema = "kincheck-vary/1"
-mode = "monte_carlo"
-units = { length = "mm", angle = "deg" }
-hardpoints.lca_front = { at = "lca_front", sigma = 1.0 }
-"""
-
-
-def test_sweep_and_primitives_in_python(tmp_path):
-    table, vary = tmp_path / "car.csv", tmp_path / "vary.toml"
-    table.write_text(sample_table(TEMPLATES["mcpherson"]))
-    vary.write_text(VARY)
-    case = kincheck.load(table, kincheck.Supplied(travel="0.05:3"))
-    results = kincheck.sweep(case, vary, samples=20)
-    assert results.samples == 20
-    assert "toe" in results.to_html()
-    assert kincheck.primitives.Dot10 is Dot10

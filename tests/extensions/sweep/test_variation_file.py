@@ -3,7 +3,6 @@
 import json
 import tomllib
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -97,38 +96,6 @@ def test_line_follows_its_positions(tmp_path):
             found["joints.strut_slide.axis"], [-0.01, 0.03, 0.02], atol=1e-12
         )
     assert "joints.strut_slide.axis" not in moved(vary(tmp_path, case, **ends), **offsets)
-
-
-def test_grid_has_each_combination_once(tmp_path):
-    ends = {
-        "tip": {"at": "tip", "values": [[-1, 0, 1], [0, 2], [0.5]]},
-        "pivot": {"at": "pivot", "half_width": [5, 0, 0], "steps": 5},
-    }
-    found = vary(tmp_path, crank(), "grid", **ends)
-    assert found.count == 3 * 2 * 1 * 5
-    rows = (found.offsets(0, 0, found.count).T * 1e3).tolist()
-    expected = [[*each] for each in product((-1, 0, 1), (0, 2), (0.5,), (-5, -2.5, 0, 2.5, 5))]
-    np.testing.assert_allclose(rows, expected, atol=1e-15)
-    # as many digits as it takes
-    pivot = {"at": "pivot", "half_width": 1, "steps": 10_000}
-    huge = vary(
-        tmp_path, crank(), "grid", tip={"at": "tip", "half_width": 1, "steps": 10_000}, pivot=pivot
-    )
-    assert huge.count == 10**24
-
-
-def test_single_changes_begin_at_nominal(tmp_path):
-    points = {
-        "tip": {"at": "tip", "sigma": [1, 0, 2]},
-        "pivot": {"at": "pivot", "values": [[-3, 0, 3], [4], [5]]},
-    }
-    found = vary(tmp_path, crank(), "one_at_a_time", **points)
-    assert found.count == 1 + 2 + 2 + 2 + 1 + 1
-    offsets = found.offsets(0, 0, found.count) * 1e3
-    assert not offsets[:, 0].any()
-    assert [(int(np.flatnonzero(c)[0]), round(c.sum())) for c in offsets.T[1:]] == [
-        *((0, -1), (0, 1), (1, -2), (1, 2), (2, -3), (2, 3), (3, 4), (4, 5))
-    ]
 
 
 # Wrong files of variations, and the messages

@@ -18,32 +18,13 @@ from ...support.case_texts import complains, write
 from ...support.examples import examples
 from ...support.model_files import driven, edited
 
-(SETTINGS,) = examples(__file__, "settings")
+WEIGHED, SETTINGS = examples(__file__, "weighed", "settings")
 
 mujoco = pytest.importorskip("mujoco")
 
 # Sums of some ten masses in metre-sized frames.
 EXACT = 1e-12
 near = partial(np.allclose, rtol=0, atol=EXACT)
-
-WEIGHED = """<mujoco><compiler boundmass="0.01" boundinertia="0.001" balanceinertia="true"/>
-<default><geom density="500"/><default class="c"><geom type="capsule" size="0.1 0.2"/></default></default>
-<worldbody><geom size="1"/>
-<body name="a" pos="1 0 2" euler="0 40 0"><joint name="h"/><geom class="c" pos="1 2 3" euler="10 20 30"/>
-  <geom type="box" size="0.1 0.2 0.3" quat="1 2 3 4" mass="3"/><geom size="1" mass="0"/>
-  <frame pos="1 0 0" euler="0 90 0" childclass="c"><geom/><geom type="ellipsoid" size="0.1 0.2 0.3"/></frame>
-  <body pos="0 0 1" euler="30 0 0"><geom type="cylinder" size="0.1" fromto="0 0 0 1 1 1"/>
-    <geom type="capsule" size="0.1" fromto="0 0 0 1 -1 1"/><geom type="box" size="0.1" fromto="0 0 0 1 -1 1"/>
-    <geom type="ellipsoid" size="0.1 0.3" fromto="0 0 0 1 -1 1"/><geom size="1" group="4"/></body></body>
-<body name="b" euler="1 2 3" pos="0 1 0"><joint type="slide"/><geom size="3"/>
-  <inertial pos="1 2 3" quat="1 .5 .2 0" mass="2" diaginertia="1 2 2.5"/></body>
-<body name="c" euler="1 2 3" pos="0 1 0"><joint type="ball"/><geom size="3"/>
-  <frame euler="20 30 40"><inertial pos="1 2 3" mass="2" fullinertia="1 2 2.5 .1 .2 .3"/></frame></body>
-<body name="d"><joint/><inertial pos="0 0 0" mass="0.001" diaginertia="1 2 4.5"/></body>
-<body name="e" pos="0 2 0"><joint/><body pos="0 0 1" euler="30 0 0"/></body>
-<body name="f"><joint type="slide"/><geom size="1" mass="0"/><geom size="1" group="4"/><geom size="2" group="7"/>
-  <site pos="1 0 0"/></body>
-</worldbody></mujoco>"""  # noqa: E501
 
 
 @pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)

@@ -87,26 +87,6 @@ def test_far_open_start_is_refused(tmp_path):
     assert load(file, driven("crank:0:0.2:5", start=("crank=0",))).assembly
 
 
-def test_joint_polynomial_offset_from_assembled_start(tmp_path):
-    text = """<mujoco><compiler angle="radian"/><worldbody>
-      <body name="a"><joint name="x" axis="0 0 1"/></body>
-      <body name="b" pos="1 0 0"><joint name="y" axis="0 0 1"/><site name="tip" pos="0.5 0 0"/></body>
-      </worldbody><equality><joint joint1="y" joint2="x" polycoef="0.1 0.9 0.4 -0.3 0.2"/></equality>
-      </mujoco>"""  # noqa: E501
-    case = load(model(tmp_path, text), driven("x:-0.4:0.6:6", start=("x=0.2",)))
-    assert case.sweep.design == 0.2
-    x = case.sweep.values
-    y = 0.1 + x * (0.9 + x * (0.4 + x * (-0.3 + x * 0.2)))
-    slope = 0.9 + x * (0.8 + x * (-0.9 + x * 0.8))
-    bend = 0.8 + x * (-1.8 + x * 2.4)
-    along, across = np.array([np.cos(y), np.sin(y)]), np.array([-np.sin(y), np.cos(y)])
-    tip = solution(case).points["tip"]
-    assert near(tip.position[:, :2].T, [[1.0], [0.0]] + 0.5 * along)
-    assert near(tip.velocity[:, :2].T, 0.5 * slope * across)
-    expected = 0.5 * (bend * across - slope**2 * along)
-    assert np.allclose(tip.acceleration[:, :2].T, expected, rtol=0, atol=1e-12)
-
-
 CHAIN = """<mujoco><compiler angle="radian"/><worldbody>
   <body name="base"><freejoint name="root"/>
     <body name="one"><joint name="one" axis="0 0 1"/>

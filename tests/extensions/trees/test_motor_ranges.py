@@ -9,7 +9,10 @@ from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 
+from ...support.examples import examples
 from ...support.model_files import driven
+
+(GRIPPER,) = examples(__file__, "gripper")
 
 JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
 <origin xyz="1 0 0"/><axis xyz="0 0 1"/><limit lower="-0.5" upper="{3}" effort="1" velocity="1"/>
@@ -54,13 +57,6 @@ def test_ros2_control_commands_are_motors(tmp_path):
         )
     )
     assert [*load(file).sweep.path.motions] == ["shoulder", "elbow"]
-
-
-GRIPPER = """<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
-<body name="left"><joint name="left" axis="0 0 1" range="0 0.8"/></body>
-<body name="right" pos="1 0 0"><joint name="right" axis="0 0 1" range="0 0.8"/></body></worldbody>
-<tendon><fixed name="split"><joint joint="right" coef="0.5"/><joint joint="left" coef="0.5"/>
-</fixed></tendon>COUPLING<actuator><general tendon="split"/></actuator></mujoco>"""
 
 
 def test_motor_of_tendon_moves_its_joints(tmp_path):

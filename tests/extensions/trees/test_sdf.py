@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.readers import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
@@ -26,22 +25,6 @@ TYPED = seeds.TYPED.decode()
 
 
 model = partial(write, name="model.sdf")
-
-
-def test_link_under_two_joints_closes_loop(tmp_path):
-    """A parallelogram of 2 and 4: the coupler does not turn, the crank and the rocker do alike."""
-    case = load(model(tmp_path, FOUR_BAR), DRIVE)
-    found = solution(case)
-    for name, sign in (("A", 1), ("D", 1), ("C", -1)):
-        turned = coordinate(case, found, name)
-        assert turned == pytest.approx(sign * case.sweep.values, abs=EXACT)
-    # the whole model stands 1 m above the ground and is turned by 30 degrees about z
-    pin = 2.0 * np.sin(case.sweep.values)
-    expected = [np.cos(np.pi / 6) * pin, np.sin(np.pi / 6) * pin, 1 + 2 * np.cos(case.sweep.values)]
-    there = found.points["B"].position
-    assert near(there, np.transpose(expected))
-    assert {joint.name for joint in case.mechanism.joints} >= {"A", "B3", "C", "D"}
-    assert case.source.split(LEFT_OUT)[1] == "visual (1), said of sdf (1)"
 
 
 def test_loop_joint_is_driven(tmp_path):

@@ -13,45 +13,7 @@ from kincheck.core.cli import main
 from ...support.case_texts import write
 from ...support.examples import examples
 
-IMPROBABLE, PROBABLE = examples(__file__, "improbable", "probable")
-
-TEXT = """
-schema = "kincheck-case/1"
-name = "arm"
-source = "made up for this test"
-[units]
-length = "LENGTH"
-angle = "ANGLE"
-[bodies.arm]
-[bodies.block]
-[joints.pivot]
-type = "revolute"
-bodies = ["ground", "arm"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[joints.slide]
-type = "translational"
-bodies = ["ground", "block"]
-point = [0, 0, 0]
-axis = [1, 0, 0]
-[points.tip]
-body = "arm"
-position = [SIZE, 0, 0]
-[points.end]
-body = "block"
-position = [0, 0, 0]
-[drivers.turn]
-type = "joint_angle"
-joint = "pivot"
-[drivers.push]
-type = "joint_displacement"
-joint = "slide"
-[sweep]
-driver = "DRIVER"
-start = -WAY
-stop = WAY
-steps = 5
-"""
+TEXT, IMPROBABLE, PROBABLE = examples(__file__, "text", "improbable", "probable")
 
 
 def said(tmp_path, length="mm", angle="deg", size="500", driver="push", way="80"):

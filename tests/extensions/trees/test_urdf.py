@@ -19,7 +19,7 @@ from kincheck.core.mechanism.motions import JointAngle
 
 from ...support.case_texts import write
 from ...support.model_files import driven, edited
-from ...support.model_poses import EXACT, coordinate, near, solution
+from ...support.model_poses import EXACT, near, solution
 from ...support.urdf_texts import DRIVE, FOUR_BAR, TREE, robot
 from .fuzz import urdf as seeds
 
@@ -57,28 +57,6 @@ def test_random_tree_places_match_pinocchio(seed, tmp_path):
         assert near([*place.at], frame.translation)
         turned = [[*place.direction(axis)] for axis in (X, Y, Z)]
         assert near(np.transpose(turned), frame.rotation)
-
-
-def test_closed_urdf_moves_as_in_pinocchio(tmp_path):
-    """All links, at every sample; the frames of the loop coincide there."""
-    pin = pytest.importorskip("pinocchio")
-    case = load(robot(tmp_path, FOUR_BAR), DRIVE)
-    found = solution(case)
-    model = pin.buildModelFromXML(FOUR_BAR)
-    data, names = model.createData(), [*model.names][1:]
-    angles = np.transpose([coordinate(case, found, name) for name in names])
-    assert angles[:, names.index("A")] == pytest.approx(case.sweep.values, abs=EXACT)
-    x, y, z = map(float, THERE.split('"')[1].split())
-    for k, values in enumerate(angles):
-        pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), values))
-        frames = {name: data.oMf[model.getFrameId(name)] for name in "abc"}
-        for name, frame in frames.items():
-            assert near(found.bodies[name].r[k], frame.translation)
-        there, here = frames["b"].act(np.array([4.0, 0, 0])), frames["c"].act(np.array([x, y, z]))
-        assert np.abs(there - here).max() < EXACT
-    tip = case.mechanism.point("tip")
-    assert tip.body == "b"
-    assert tip.position == pytest.approx((2.0, 0.0, 3.0))
 
 
 Y_AXIS = '<parent_axis xyz="0 1 0"/>'

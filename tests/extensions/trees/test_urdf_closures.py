@@ -13,7 +13,7 @@ from ...support.model_files import driven
 from ...support.model_poses import coordinate, solution
 from ...support.urdf_texts import robot
 
-BESIDE, UNKNOWN = examples(__file__, "beside", "unknown")
+FIVE_BAR, BESIDE, UNKNOWN = examples(__file__, "five_bar", "beside", "unknown")
 
 FOUR_LINKS = """<robot name="r"><link name="base"/><link name="crank"/><link name="coupler"/>
 <link name="rocker"/><joint name="A" type="continuous"><parent link="base"/><child link="crank"/>
@@ -43,10 +43,7 @@ def test_closures_beside_urdf_close_loop(way, tmp_path):
     assert turned == pytest.approx([0.0, -0.21837050332959212, -0.4317512663107136], abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    UNKNOWN,
-)
+@pytest.mark.parametrize(("old", "new", "said"), UNKNOWN)
 def test_unknown_name_in_closures_is_named(old, new, said, tmp_path):
     pytest.importorskip("yaml")
     file = robot(tmp_path, FOUR_LINKS)
@@ -92,21 +89,6 @@ def test_loops_beside_other_format_warn(name, beside, tmp_path):
     assert said in read_tree(file).notes
     write(tmp_path, "", "other.urdf")
     assert said not in read_tree(file).notes
-
-
-FIVE_BAR = """<robot name="planar"><link name="base"/><link name="l"/><link name="l2"/>
-<link name="r"/><link name="r2"/><link name="closing_tip_1"/><link name="closing_tip_2"/>
-<joint name="m1" type="continuous"><parent link="base"/><child link="l"/><axis xyz="0 0 1"/></joint>
-<joint name="p1" type="continuous"><parent link="l"/><child link="l2"/><origin xyz="0 0.2 0"/>
-<axis xyz="0 0 1"/></joint>
-<joint name="m2" type="continuous"><parent link="base"/><child link="r"/><origin xyz="0.3 0 0"/>
-<axis xyz="0 0 1"/></joint>
-<joint name="p2" type="continuous"><parent link="r"/><child link="r2"/><origin xyz="0 0.2 0"/>
-<axis xyz="0 0 1"/></joint>
-<joint name="f1" type="fixed"><parent link="l2"/><child link="closing_tip_1"/>
-<origin xyz="0.15 0.2 0"/></joint>
-<joint name="f2" type="fixed"><parent link="r2"/><child link="closing_tip_2"/>
-<origin xyz="-0.15 0.2 0"/></joint></robot>"""
 
 
 def test_closing_frames_are_one_point(tmp_path):
