@@ -86,17 +86,16 @@ class PinocchioSteps(SteppedTree, PinocchioModel):
         )
 
     def plan(self) -> Iterable[Chain | Relation | Closure]:
-        # Depth first, with the links of a closure right after the body that carries them:
-        # Pinocchio's inertia algorithms require consecutive joint numbers in a subtree. In any
-        # other order the results of constraintDynamics are silently wrong.
+        # Depth first: Pinocchio's inertia algorithms require consecutive joint numbers in a
+        # subtree. In any other order the results of constraintDynamics are silently wrong.
         parts = [*super().plan()]
         chains = [part for part in parts if isinstance(part, Chain)]
 
         def chains_on(bodies: Collection[str]) -> Iterator[Chain]:
-            on = [chain for chain in chains if chain.parent in bodies]
-            for chain in sorted(on, key=lambda chain: not chain.cut):
-                yield chain
-                yield from chains_on([chain.child])
+            for chain in chains:
+                if chain.parent in bodies:
+                    yield chain
+                    yield from chains_on([chain.child])
 
         yield from chains_on([*self.carrier])  # before any chain, those are the ground
         yield from (part for part in parts if not isinstance(part, Chain))

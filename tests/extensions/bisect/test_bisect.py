@@ -10,9 +10,11 @@ from math import log2
 from pathlib import Path
 from zipfile import ZipFile
 
+import numpy as np
 import pytest
 from kincheck.core.cli.main import main
 from kincheck.core.extensions.bisect.inside import shadow_of
+from kincheck.core.extensions.bisect.probes import mujoco as probe
 from kincheck.core.extensions.bisect.search import changes
 
 from .wheels import case, engine, twelve, wheel
@@ -187,6 +189,13 @@ def test_disk_limit_removes_longest_unused(offline):
     found("crank.toml", "--from", "1.0", "--to", "3.0", "--every", "--disk", "1e-9")
     left = [each.name.split("-")[2] for each in offline.glob("environments/bisect/*")]
     assert left == ["3.0"]
+
+
+def test_probe_of_mujoco_reads_its_numbers():
+    """Right releases keep the inertias and limits of the probe's file to round-off."""
+    pytest.importorskip("mujoco")
+    for made, given, most in probe.read().values():
+        assert np.abs(np.subtract(made, given)).max() <= most
 
 
 def test_other_copy_of_release_is_found(tmp_path, monkeypatch):

@@ -228,6 +228,22 @@ def test_board_site_has_every_row(site, rows):
     assert "://" not in page.replace("http://www.w3.org", "")
 
 
+def test_row_is_worse_by_error():
+    """Also by one that it has no more; without runs it compares with any."""
+    better, worse = (
+        Row(**GIVEN, column="best", state="measured", runs=[Run(error=error)])
+        for error in (1e-6, 2e-6)
+    )
+    ends = [better, worse, Row(**GIVEN, column="best", state="error")]
+    assert [[now.worse_than(before) for before in ends] for now in ends] == [
+        [False, False, False],
+        [True, False, False],
+        [True, True, False],
+    ]
+    absent = Row(**GIVEN, column="best", state="unavailable")
+    assert not absent.worse_than(better)
+
+
 @pytest.mark.nightly
 def test_board_keeps_row_history(tmp_path, capsys):
     given = ["--engine", "mujoco", "--case", short(tmp_path, 0.02, 3)]
