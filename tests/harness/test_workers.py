@@ -52,6 +52,7 @@ def test_engine_faults_become_records():
         assert (kind, record.outcome) == (kind, outcome)
         assert message in record.message
         assert len(record.message) < LONGEST_MESSAGE + 100
+        assert " left out ..." not in record.message or len(record.message) >= LONGEST_MESSAGE
         assert record.version == "1.2"  # it was told before the fault
         assert found[kind, "good"].outcome is Outcome.PASS
     # the line that crashed, the end of what was printed, and no more

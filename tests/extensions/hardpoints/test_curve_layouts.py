@@ -118,7 +118,10 @@ def test_empty_curve_cell_is_interpolated(tmp_path, car):
         ({3: ",0.1,0.2,3"}, "no driver value"),
         ({3: "Steer [mm],Toe [deg],Camber [deg],Fz [N]"}, "not the head"),
         ({3: "-30,0,47,1,5,2400"}, "complete the row"),
-        ({k: f"{TRAVEL[k - 1]},,0.1,1" for k in range(1, 12)}, "0 numbers in column"),
+        (
+            {k: f"{TRAVEL[k - 1]},,0.1,1" for k in range(1, 12)},
+            "0 numbers in column ... expected some",
+        ),
     ],
 )
 def test_damaged_curve_row_is_refused(tmp_path, car, change, words):

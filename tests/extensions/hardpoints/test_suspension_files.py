@@ -1,6 +1,7 @@
 """[suspension] of a case file, points of its wheel, and reports of its outputs."""
 
 import json
+import re
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 
@@ -87,6 +88,10 @@ def test_reference_signs_must_match():
     table = TABLE.replace("# signs: iso8855\n", "")
     told = 'found no convention of signs, expected ... write "# signs: iso8855"'
     refused(lambda: loaded(STRUT, table), told)
+    height = {"point": "wheel_center", "component": "z", "atol": 1e-6, "why": "of no side"}
+    mixed = re.sub(r"(?m)^(?!#)(.+)$", r"\1,0.1", TABLE).replace(",0.1\n", ",height\n", 1)
+    data = changed("outputs", data, height=height)
+    refused(lambda: loaded(data, mixed), "found 'iso8855' of signs, expected 'sae_j670'")
 
 
 def test_per_travel_false_omits_slopes():
