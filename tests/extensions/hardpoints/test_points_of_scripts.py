@@ -174,6 +174,12 @@ def test_python_unit_is_read(tmp_path, comment):
     assert read_hardpoints(tmp_path / "points.py").unit == "mm"
 
 
+def test_python_value_like_unit_is_listed(tmp_path):
+    (tmp_path / "points.py").write_text(f"{POINT}unit = 'mm'\nlabel = 'mm'\n")
+    found = read_hardpoints(tmp_path / "points.py")
+    assert (found.unit, found.left_out) == ("mm", ["values line 3 label"])
+
+
 def test_python_two_units_are_refused(tmp_path):
     (tmp_path / "points.py").write_text(f"{POINT}b = (1, 2, 3)  # in m\nc = (1, 2, 4)  # [mm]\n")
     with pytest.raises(CaseError, match="line 3: found 'mm', and 'm' above, expected one unit"):

@@ -73,6 +73,14 @@ def test_yield_and_capability_of_normal_output(found):
     assert (whole.output, whole.outside, whole.share) == ("", y.outside, y.share)
 
 
+def test_grid_has_yield_without_interval(tmp_path):
+    """Its variants are chosen: nothing is estimated."""
+    case = crank()
+    variation = vary(tmp_path, case, "grid", tip={"at": "tip", "values": [[-1, 1], [0], [0]]})
+    found = sweep_designs(case, replace(variation, limits=(Limit("y", high=1.0),)))
+    assert [(each.known, each.interval) for each in found.limits] == [(2, None)] * 2
+
+
 def test_histogram_counts_every_variant(found):
     each = found.outputs["y"].histogram
     assert sum(each.counts) == 4096
