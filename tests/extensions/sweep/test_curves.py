@@ -247,6 +247,21 @@ def test_wrong_arguments_have_one_message(corner, arguments, said):
     assert said in str(error.value)
 
 
+def test_name_with_space_is_no_axis():
+    case = kincheck.load("modelica_four_bar_distance")
+
+    def with_rod(name):
+        joints = [
+            replace(each, name=name, length=each.rod_length) if each.name == "rod" else each
+            for each in case.mechanism.joints
+        ]
+        longer = replace(case, mechanism=replace(case.mechanism, joints=joints))
+        place, out = f"joints.{name}.length", "slider_pin_x"
+        return kincheck.curves(longer, [place], [[1e-3]], [out]).values[out]
+
+    np.testing.assert_allclose(with_rod("tie rod"), with_rod("rod"), rtol=0.0, atol=CLOSE)
+
+
 def test_absolute_driver_of_varied_point(corner):
     drivers = [
         replace(each, relative=False) if isinstance(each, PointCoordinate) else each
