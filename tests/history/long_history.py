@@ -21,8 +21,8 @@ from ..support.history_runs import FACTS
 
 CASES = ["five_bar", "rssr", "mcpherson_strut"]
 ENGINES = {"native": "0.3.0", "mujoco": "4.0.0", "pinocchio": "4.1.0"}
-MEGABYTES = 150
-"""What a report, and a list of the runs, may take of memory."""
+MEGABYTES = 20
+"""What a report, and a list of the runs, may take of memory, imports apart."""
 
 
 def make(path, runs):
@@ -86,7 +86,7 @@ def _tables(connection):
 
 
 COUNTED = """
-import contextlib, io, json, resource, sys
+import contextlib, io, json, sys, tracemalloc
 from kincheck.core.cli.main import main
 
 calls, said = 0, io.StringIO()
@@ -98,16 +98,17 @@ def count(frame, event, argument):
 with contextlib.redirect_stdout(io.StringIO()):
     main(sys.argv[1:])  # what is imported, and what stays in memory
 with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+    tracemalloc.start()
     sys.setprofile(count)
     status = main(sys.argv[1:])
     sys.setprofile(None)
-memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-print(json.dumps([status, calls, memory / 1024, said.getvalue()]))
+memory = tracemalloc.get_traced_memory()[1]
+print(json.dumps([status, calls, memory / 1e6, said.getvalue()]))
 """
 
 
 def cost(*words):
-    """Status, calls of functions, memory [MB] and output of a command.
+    """Status, calls of functions, largest memory [MB] and output of a command.
 
     Calls are counted, since the time of a processor is another one on each machine.
     """
