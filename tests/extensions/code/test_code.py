@@ -200,7 +200,10 @@ def test_drivers_move_to_own_values(name, tmp_path):
 
 
 @node
-@pytest.mark.parametrize("name", ["four_bar", "mcpherson_suspension"])
+@pytest.mark.parametrize(
+    "name",
+    ["four_bar", pytest.param("mcpherson_suspension", marks=pytest.mark.needs("hardpoints"))],
+)
 def test_javascript_of_case_equals_native(name, tmp_path):
     case = kincheck.load(name)
     write(tmp_path, js.files(case, ()))
