@@ -129,6 +129,18 @@ def test_tendons_and_balls_are_compared(old, new, text, tmp_path):
     assert text in found
 
 
+def test_rest_without_spring_is_no_law(tmp_path):
+    """A damper has no place of rest."""
+    text = (
+        '<mujoco><worldbody><body name="a"><joint name="J" damping="1"/><geom size="0.1"/></body>'
+    )
+    for name, rest in (("a", ""), ("b", ' springref="20"')):
+        changed = text.replace(' damping="1"', ' damping="1"' + rest)
+        (tmp_path / f"{name}.xml").write_text(f"{changed}</worldbody></mujoco>")
+    found = compare(*(undriven_file(tmp_path / f"{name}.xml") for name in "ab"), {})
+    assert (found.verdict, found.lost) == ("same", [])
+
+
 @pytest.mark.needs("osim")
 def test_format_without_words_is_named(tmp_path):
     robot = random_closed(2, LAWS)

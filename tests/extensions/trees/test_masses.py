@@ -1,5 +1,6 @@
 """Masses of models: those of MuJoCo itself, of URDF and SDF alike, and what is not read of them."""
 
+import re
 from functools import partial
 
 import kincheck.cases
@@ -82,6 +83,13 @@ def test_masses_agree_across_formats(tmp_path):
         assert body.mass == 3.0
         first, other = ((*x.center_of_mass, *x.inertia) for x in (bodies[0], body))
         assert near(first, other)
+
+
+def test_sdf_link_without_mass_has_one(tmp_path):
+    light = re.sub(r"<inertial><pose>0\.1.*?</inertial>", "", SDF, flags=re.S)
+    case = case_of(tmp_path, light)
+    assert case.mechanism.body("arm").mass == 3.0
+    assert "masses of links without one, 1 kg each as in SDF" in case.source
 
 
 @pytest.mark.parametrize("text", [URDF, SDF], ids=["urdf", "sdf"])
