@@ -236,8 +236,14 @@ def test_wheel_points_equal_wheel_numbers():
     data = deepcopy(unreferenced(STRUT))
     data["suspension"] |= {"static_toe": STATIC_TOE, "static_camber": STATIC_CAMBER}
     expected = solved(loaded(data))
-    for name, values in solved(loaded(pointed())).items():
+    case = loaded(pointed())
+    for name, values in solved(case).items():
         np.testing.assert_allclose(values, expected[name], rtol=1e-12, atol=1e-12, err_msg=name)
+    hub, center = (
+        np.array(case.mechanism.point(name).position) for name in ("hub", "wheel_center")
+    )
+    spin = [*case.outputs[0].vehicle.spin(case.mechanism)]
+    np.testing.assert_allclose(spin, (hub - center) / 0.1, atol=1e-12)
 
 
 @pytest.mark.parametrize(("changes", "key", "words"), FAULTS, ids=str)
