@@ -16,7 +16,7 @@ import re
 from dataclasses import dataclass
 
 LANGUAGES = {
-    "sh", "console", "python", "text", "toml", "csv", "xml", "yaml", "ini", "json",
+    "sh", "console", "python", "c", "text", "toml", "csv", "xml", "yaml", "ini", "json",
     "math", "markdown", "crontab", "powershell",
 }  # fmt: skip
 BLOCK = re.compile(

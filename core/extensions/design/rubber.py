@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...caches import cache_last
 from ...case.case import Case
@@ -76,32 +76,34 @@ def rubber_curves(
     """
     moves = np.asarray(offsets, dtype=np.float64)[0]
 
-    def at(where: Array) -> Mapping[str, Array]:
+    def at(where: Array) -> tuple[Mapping[str, Array], NDArray[np.bool_]]:
         return _study(case, tuple(places), tuple(where.tolist()))
 
-    here = at(moves)
+    here, reached = at(moves)
     steps: list[Array] = [*(STEP * np.eye(len(moves)))] if slopes else []
-    ends = [(at(moves + step), at(moves - step)) for step in steps]
+    ends = [(at(moves + step)[0], at(moves - step)[0]) for step in steps]
     by = {
         name: np.stack([(a[name] - b[name]) / (2.0 * STEP) for a, b in ends], axis=-1)[None]
         for name in slopes
     }
     values = {name: here[name][None] for name in outputs}
-    solved = np.isfinite(here[""])[None]
+    solved = reached[None]
     drive = Driving(case.sweep.path.times, case.sweep.moved, {})
     return DesignCurves(values, solved, by, {}, {}, {}, {}, drive)
 
 
 @cache_last(_KEPT)
-def _study(case: Case, places: tuple[str, ...], moves: tuple[float, ...]) -> Mapping[str, Array]:
-    """Return the curves; the wheel's load, known where there is an equilibrium, has no name."""
+def _study(
+    case: Case, places: tuple[str, ...], moves: tuple[float, ...]
+) -> tuple[Mapping[str, Array], NDArray[np.bool_]]:
+    """Return the curves, and whether there is an equilibrium."""
     rates = dict(zip(places, np.exp(moves).tolist(), strict=True))
     mechanism = case.mechanism
     soft = [replace(each, stiffness=_scaled(each, rates)) for each in mechanism.bushings]
     outputs = tuple(each for each in case.outputs if not isinstance(each, OnRubber))
     case = replace(case, mechanism=replace(mechanism, bushings=soft), outputs=outputs)
     found = compliance(case, case.sweep.change).travel
-    return {"": found.wheel_load} | {name: each.values for name, each in found.outputs.items()}
+    return {name: each.values for name, each in found.outputs.items()}, found.reached
 
 
 def _role(bushing: Bushing) -> str:

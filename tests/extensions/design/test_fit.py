@@ -312,7 +312,9 @@ def test_rates_equal_written_bushings(tmp_path):
     car, file = table(tmp_path, "double_wishbone"), tmp_path / "rubber.toml"
     case = rubber.on_rubber(on_bushings(car, file, RUBBER, 2))
     names = [f"{name}.per_{load}_force" for name, load in COMPLIANCE.items()]
-    found = rubber.rubber_curves(case, [*RATES], [[*RATES.values()]], names).values
+    curves = rubber.rubber_curves(case, [*RATES], [[*RATES.values()]], names)
+    assert curves.solved.all()  # without a spring, too
+    found = curves.values
     new = on_bushings(car, tmp_path / "new.toml", rubber.new_bushings(file, case, RATES), 2)
     assert [each.stiffness for each in new.mechanism.bushings[:2]] == [
         pytest.approx((1e6 * np.exp(0.2), 2e6, 1e6)),
