@@ -29,7 +29,7 @@ from .test_live_page import FIELD, answered, drag, height, text, type_in, until_
 CLOSE = 1e-12
 """Largest difference [m, rad and per m], a thousand round-offs of steps that differ."""
 LARGEST = 2_000_000
-"""Bytes of a page that goes by mail, a fifth of what servers take: the curves of some cases alone are
+"""Bytes of a page that goes by mail: a fifth of what servers take. Curves of some cases alone are
 0.8 million."""
 QUICK = 50.0
 """Time of an answer of an axle at 161 samples [ms]."""
