@@ -4,7 +4,7 @@ from ...doors import Extension
 
 EXTENSION = Extension(
     __name__,
-    needs=["environments", "free", "reports"],
+    needs=["environments", "free", "reports", "steppers"],
     commands={"board": "command:CompareSteppers"},
     schemas={"board": "results:Board"},
 )

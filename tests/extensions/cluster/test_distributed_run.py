@@ -200,7 +200,9 @@ def test_invalid_scheduler_address_is_refused(address, monkeypatch):
     )
 
 
-@pytest.mark.parametrize("command", ["run", "sweep"])
+@pytest.mark.parametrize(
+    "command", ["run", pytest.param("sweep", marks=pytest.mark.needs("sweep"))]
+)
 def test_commands_refuse_invalid_scheduler(kincheck_main, capsys, tmp_path, monkeypatch, command):
     """And no client is made, for whose end the process would wait."""
     forbid_clients(monkeypatch)

@@ -33,6 +33,8 @@ from ...support.exported import IN_TREES, read
 from ...support.loads import six
 
 # The arm: masses [kg] and their places, global at design [m].
+pytestmark = pytest.mark.needs("writers", "trees", "osim", "dart")  # they read what is written
+
 MASSES = np.array([0.5, 0.75, 1.25, 0.3])
 PLACES = np.array([[0.4, 0.1, 0.0], [0.1, -0.2, 0.3], [0.7, 0.0, -0.1], [0.2, 0.3, 0.2]])
 ORIGIN = (0.25, -0.5, 0.125)

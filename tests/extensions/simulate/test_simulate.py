@@ -285,6 +285,7 @@ def test_simulation_reaches_other_side(name):
 # What the simulators' own solvers cannot express, and the command line that keeps modes apart
 
 
+@pytest.mark.needs("drake", "dart")
 def test_rod_of_given_length_stays_distance():
     plain = mcpherson()
     joints = [
@@ -308,7 +309,9 @@ def gears():
     return motion_case(mechanism, np.linspace(0.0, 7.0, 71))
 
 
-@pytest.mark.parametrize("name", ["exudyn", "drake"])
+@pytest.mark.parametrize(
+    "name", ["exudyn", pytest.param("drake", marks=pytest.mark.needs("drake"))]
+)
 def test_uneven_samples_are_refused(name):
     uneven = replace(gears(), sweep=Sweep("turn", np.array([0.0, 0.1, 0.3])))
     assert "equidistant" in adapters.engine(name, "simulate").unsupported(uneven)
@@ -343,6 +346,7 @@ def simulated(tmp_path, *options):
     return status, [(each.engine, each.mode) for each in from_json(file.read_bytes()).records]
 
 
+@pytest.mark.needs("equilibria")
 def test_command_line_separates_modes(tmp_path, capsys):
     assert simulated(tmp_path, "--mode", "simulate", "--engine", "mujoco") == (
         1,
