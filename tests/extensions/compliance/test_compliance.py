@@ -308,6 +308,7 @@ def load_cases(tmp_path_factory):
     return found
 
 
+@pytest.mark.needs("equilibria")
 @pytest.mark.by_day(2)
 @pytest.mark.parametrize("name", [*SIMULATORS, "exudyn-static"])
 def test_engine_equilibria_equal_data(load_cases, name):
@@ -368,6 +369,7 @@ class Stiff(NativeEngine):
         return super().equilibria(replace(case, mechanism=replace(case.mechanism, forces=forces)))
 
 
+@pytest.mark.needs("simulate")
 def test_engine_without_statics_is_unsupported(tmp_path, capsys):
     engine_of("mujoco")
     options = ["--travel=0:20mm:2", "--jobs=0", "--engine", "mujoco-default"]
@@ -386,6 +388,7 @@ def test_bench_compliance_times_samples_and_matrices(tmp_path, capsys):
     assert "us a matrix at least" in capsys.readouterr().out
 
 
+@pytest.mark.needs("equilibria")
 @pytest.mark.parametrize("name", ["mujoco", "exudyn", "exudyn-static"])
 def test_bushings_in_series_closed_form(tmp_path, capsys, name):
     """In mm; the second bushing's axes turn with its first body, which carries a couple."""
@@ -404,6 +407,7 @@ def test_bushings_in_series_closed_form(tmp_path, capsys, name):
     assert {row["outcome"] for row in found["agreement"]} == {"pass", "not judged"}
 
 
+@pytest.mark.needs("equilibria")
 def test_python_compliance_with_engine_verdicts(tmp_path):
     """A stiff engine by itself, and a simulator by its name."""
     engine_of("pinocchio")

@@ -7,6 +7,8 @@ import pytest
 from ...docs.page import blocks
 from ...support.sources import ROOT
 
+pytestmark = pytest.mark.needs("hardpoints")  # it brings the case
+
 PLACES = ["joints.tie_rod.points.0 z", "joints.tie_rod.points.1 y"]
 PAGE = ROOT / "core/extensions/sweep/docs/how-to/curves.md"
 

@@ -156,6 +156,7 @@ def test_limits_use_file_units(file, tmp_path, capsys):
     assert "95 % interval" in told
 
 
+@pytest.mark.needs("hardpoints")
 @pytest.mark.parametrize(
     ("limit", "low", "high"),
     [
@@ -172,6 +173,7 @@ def test_limits_with_own_unit(limit, low, high):
     assert [found.low, found.high] == pytest.approx(ends, rel=1e-15)
 
 
+@pytest.mark.needs("hardpoints")
 def test_limits_of_table_in_degrees(tmp_path, capsys):
     main(["templates", "mcpherson"])
     car, out = tmp_path / "car.csv", tmp_path / "out"
@@ -188,6 +190,7 @@ def test_limits_of_table_in_degrees(tmp_path, capsys):
     assert [float(row["low"]), float(row["high"])] == pytest.approx([-1.5, 3.0])
 
 
+@pytest.mark.needs("hardpoints")
 @pytest.mark.parametrize("limit", ["toe:-2:2mm", "toe:-2deg:2rad", "toe:-2:2dgr", "toe:deg:deg"])
 def test_limits_of_wrong_unit_are_refused(limit):
     with pytest.raises(

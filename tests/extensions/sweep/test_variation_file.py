@@ -16,6 +16,7 @@ from ...support.fakes import crank
 from ...support.variations import HEAD, moved, vary
 
 
+@pytest.mark.needs("hardpoints")
 def test_coincident_places_move_together(tmp_path):
     case = load("mcpherson_suspension")
     together = moved(vary(tmp_path, case, ball={"at": "ball", "sigma": [1, 0, 2]}), ball__x=0.25)
@@ -28,6 +29,7 @@ def test_coincident_places_move_together(tmp_path):
     assert set(alone.places) == {"joints.ball.point"}
 
 
+@pytest.mark.needs("hardpoints")
 def test_markers_follow_wheel_centre(tmp_path):
     """Else the wheel's axis of rotation, which goes through both, would turn."""
     found = moved(
