@@ -5,10 +5,12 @@ Bodies and joints are given globally, at a closed pose. What a format says of a 
 joint like others (SDF, USD, OpenSim), a constraint (URDF), halves of a body or points (MJCF).
 """
 
+import importlib.util
 import json
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from kincheck.core.doors import extensions
 from scipy.spatial.transform import Rotation
 
 from .osim_texts import axis as osim_axis
@@ -530,9 +532,13 @@ FORMATS = {
     "USD": (usd, "usda"),
     "OpenSim": (osim, "osim"),
 }
-"""Of models that `kincheck same` compares."""
+"""Of models that `kincheck same` compares, those that are read here."""
 CHAINS = FORMATS | {"Adams": (adams, "adm"), "case": (case_file, "json")}
 """Of chains of hinges."""
+for form, reader in (("USD", "usd"), ("OpenSim", "osim"), ("Adams", "adams")):
+    if reader not in extensions() or (form == "USD" and importlib.util.find_spec("pxr") is None):
+        FORMATS.pop(form, None)
+        CHAINS.pop(form)
 
 
 def written(form, robot, folder, rng, digits=None, name="model"):

@@ -5,7 +5,6 @@ For many more:
     KINCHECK_ROBOTS=30 pytest -m "" tests/extensions/same/test_same_robots.py
 """
 
-import importlib.util
 import os
 import re
 from dataclasses import replace
@@ -13,7 +12,6 @@ from itertools import combinations, permutations
 
 import numpy as np
 import pytest
-from kincheck.core.doors import extensions
 from kincheck.core.extensions.same.undriven import undriven_file
 from kincheck.core.extensions.same.verdict import compare
 
@@ -22,9 +20,6 @@ from ...support.examples import examples
 
 (CHANGES,) = examples(__file__, "changes")
 
-absent = {"OpenSim": "osim" not in extensions()}
-absent["USD"] = "usd" not in extensions() or importlib.util.find_spec("pxr") is None
-FORMATS = {form: way for form, way in FORMATS.items() if not absent.get(form)}
 SEEDS = range(int(os.environ.get("KINCHECK_ROBOTS", "8")))
 LOST = re.compile(r"lost in (\S+): (.+) of ([^()]+?)( \(\w+ cannot say it\))?")
 

@@ -67,7 +67,14 @@ def contents(text):
     return count
 
 
-@pytest.mark.parametrize("kind", [*XML, *FIXED])
+OF_OSIM = pytest.mark.needs("osim")
+KINDS = [
+    pytest.param(kind, marks=OF_OSIM) if kind.startswith("OpenSim") else kind
+    for kind in (*XML, *FIXED)
+]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_account_adds_up(kind, tmp_path):
     if "YAML" in kind:
         pytest.importorskip("yaml")
@@ -117,7 +124,7 @@ def places(root, rng):
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize("kind", [*XML, *FIXED])
+@pytest.mark.parametrize("kind", KINDS)
 def test_planted_name_is_named(kind, plant, tmp_path):
     if "YAML" in kind:
         pytest.importorskip("yaml")
@@ -140,7 +147,7 @@ def misspelt(word):
     return word[: k - 1] + word[k] + word[k - 1] + word[k + 1 :] if k else word
 
 
-@pytest.mark.parametrize("kind", [*XML, *FIXED])
+@pytest.mark.parametrize("kind", KINDS)
 def test_misspelt_name_is_named(kind, tmp_path):
     """Or the run stops at what is missing in its place."""
     if "YAML" in kind:
@@ -182,6 +189,7 @@ ODD = {"float2": "(1, 2)", "double[]": "[1, 2]", "matrix2d": "((1, 0), (0, 1))"}
 
 
 @pytest.mark.skipif(not HAS_USD, reason="usd-core is not installed")
+@pytest.mark.needs("usd")
 def test_account_of_usd_adds_up(tmp_path):
     for seed in range(MODELS):
         text = next(iter(FORMATS["USD"](random_robot(seed)).values()))
@@ -195,6 +203,7 @@ def test_account_of_usd_adds_up(tmp_path):
 
 
 @pytest.mark.skipif(not HAS_USD, reason="usd-core is not installed")
+@pytest.mark.needs("usd")
 def test_planted_usd_is_named(tmp_path):
     text = next(iter(FORMATS["USD"](random_robot(0)).values()))
     heads = [*re.finditer(r"def (\w+) \"\w+\" *(\([^)]*\))?\s*\{", text)]

@@ -34,6 +34,7 @@ def solved(case):
     )(1e-12)
 
 
+@pytest.mark.needs("blocks")
 @pytest.mark.parametrize("limits", [(-0.5, 0.5), (0.4, 2.9)])
 def test_motion_evaluations_grow_linearly_with_motors(limits, tmp_path, monkeypatch):
     at, calls = Table.at, []

@@ -116,6 +116,7 @@ def test_csv_heads_of_model_from_zero(model):
     assert not any(name.endswith(".qpos") for name in found)
 
 
+@pytest.mark.needs("exports", "writers")
 def test_exported_mjcf_keeps_zeros_of_model(model, tmp_path, capsys):
     """A spring of the model counts from its zero too."""
     text = LOOP.replace('ref="-15"', 'ref="-15" stiffness="2" springref="10"')
@@ -129,6 +130,7 @@ def test_exported_mjcf_keeps_zeros_of_model(model, tmp_path, capsys):
     assert float(pin.get("springref")) == pytest.approx(np.radians(10), abs=EXACT)
 
 
+@pytest.mark.needs("exports", "writers")
 @pytest.mark.parametrize("to", ["urdf", "sdf", "exudyn"])
 def test_exports_note_zero_of_case(to, model, tmp_path):
     out = tmp_path / "again"

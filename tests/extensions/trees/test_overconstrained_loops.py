@@ -6,7 +6,6 @@ For more of each:
     KINCHECK_LOOPS=9 pytest -m "" tests/case/test_overconstrained_loops.py
 """
 
-import importlib.util
 import os
 from dataclasses import replace
 
@@ -22,8 +21,6 @@ from scipy.spatial.transform import Rotation
 from ...support.cut_models import CHAINS, closed_chain, written
 from ...support.overconstrained_loops import FAMILIES, random_loop
 
-if importlib.util.find_spec("pxr") is None:
-    CHAINS = {form: way for form, way in CHAINS.items() if form != "USD"}
 SEEDS = range(1, 1 + int(os.environ.get("KINCHECK_LOOPS", "1")))
 DIGITS = (4, 5, 6, 8, 12)
 ANGLES = np.linspace(0.0, 0.6, 7)

@@ -46,6 +46,7 @@ def test_built_in_cases_have_no_notes():
     assert {name: found for name in cases.names() if (found := notes(cases.load(name)))} == {}
 
 
+@pytest.mark.needs("explain")
 def test_size_note_in_run_and_explain(tmp_path, capsys):
     said(tmp_path, way="0.08")
     file = str(tmp_path / "case.toml")
