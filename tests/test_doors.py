@@ -78,7 +78,7 @@ def test_method_of_extension_by_name(found, monkeypatch):
     solve = NativeSolver(method="by hand").prepare(case.mechanism, case.sweep.path)
     assert (made, solve(1e-12)) == ([case.mechanism], "solved")
     with pytest.raises(
-        KincheckError, match=r"method 'other'\. Leave it out, or give one of by hand"
+        KincheckError, match=r"method 'other'\. Give one of by hand, by size, one program"
     ):
         NativeSolver(method="other").prepare(case.mechanism, case.sweep.path)
 

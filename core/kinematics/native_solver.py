@@ -68,9 +68,9 @@ class NativeSolver:
                 mechanism, request, path, lambda each: Route(compile_model(mechanism, each), path)
             )
         if (make := by_method(self.method)) is None:
+            known = sorted({*offers("methods"), Method.BY_SIZE.value, Method.ONE_PROGRAM.value})
             raise SolveError(
-                f"no extension has the method '{self.method}'. Leave it out, or give one of"
-                f" {', '.join(sorted(offers('methods')))}."
+                f"no extension has the method '{self.method}'. Give one of {', '.join(known)}."
             )
         motion = make(mechanism, motion_only(mechanism, request))(path)
         return by_motion(mechanism, request, path, motion)

@@ -281,6 +281,7 @@ def test_foreign_file_formats_are_refused(tmp_path, name):
     complains(file, f"{file}: ... {fragment}", SAID)
 
 
+@pytest.mark.needs("explain")
 def test_folder_as_case_is_refused(tmp_path, capsys):
     (tmp_path / "car.csv").mkdir()
     assert main(["explain", str(tmp_path / "car.csv")]) == 2

@@ -166,6 +166,7 @@ def test_wishbone_explorer_csv_by_command(tmp_path, explorer):
     assert toe == pytest.approx(explorer["toe"][::20], abs=1e-13)
 
 
+@pytest.mark.needs("measured", "suspects")
 def test_measured_camber_definition_is_named(tmp_path, published, capsys):
     """Compared as it stands, the camber is off, and the message states its other definition."""
     sweep = tmp_path / "sweep.csv"

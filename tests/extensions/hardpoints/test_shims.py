@@ -55,6 +55,7 @@ def test_tie_rod_moves_equal_rod_formula(name):
     assert found[inner] == pytest.approx((at[outer] - at[inner]) @ v / v, rel=1e-5)
 
 
+@pytest.mark.needs("explain")
 def test_explain_prints_shims_in_degrees(tmp_path, capsys):
     main(["templates", "double_wishbone"])
     (tmp_path / "car.csv").write_text(capsys.readouterr().out)

@@ -34,6 +34,7 @@ def folder(tmp_path, monkeypatch, capsys):
     return tmp_path
 
 
+@pytest.mark.needs("measured", "suspects")
 def test_run_tells_units_of_table(folder, capsys):
     words = "--reference measured.csv --out . --verbose"
     assert main([*RUN.split(), *words.split()]) == 1
@@ -72,6 +73,7 @@ def test_report_tells_units_of_table(folder, capsys):
     assert not re.search(r"\d rad\b", shown)
 
 
+@pytest.mark.needs("measured")
 def test_citation_is_asked_by_option(folder, capsys):
     main([*RUN.split(), "--reference", "measured.csv"])
     assert "measured.csv does not say where it comes from" in (out := capsys.readouterr().out)

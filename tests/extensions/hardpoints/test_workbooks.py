@@ -111,6 +111,7 @@ def test_workbook_formulas_are_read_by_value(tmp_path, plain):
     assert load(file, SAID).mechanism == plain
 
 
+@pytest.mark.needs("explain")
 def test_sheet_option_chooses_hardpoints(tmp_path, plain, capsys):
     rear = [HEAD, *([name, x, 2 * y, z] for name, (x, y, z) in POINTS.items())]
     file = book(tmp_path, {"Front axle": ROWS, "Rear axle": rear, "Notes": [["x"]]})

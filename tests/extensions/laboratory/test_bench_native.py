@@ -118,6 +118,7 @@ def test_study_measurement_by_threads(monkeypatch):
     assert (alone.variants, alone.peak_times) == (128, None)
 
 
+@pytest.mark.needs("blocks")
 def test_chain_sizes_until_time_limit(monkeypatch):
     monkeypatch.setattr(size, "LOOPS", (1, 2))
     monkeypatch.setattr(size, "MANY", (3, 4))
@@ -137,6 +138,7 @@ def test_chain_sizes_until_time_limit(monkeypatch):
     assert second.message.startswith("not tried: 1 took")
 
 
+@pytest.mark.needs("blocks")
 def test_scaling_rows_have_residual_and_error():
     rows = size.measure_scalings([3], TOL, rounds=1)
     assert [(row.mechanism, row.size, row.bodies, row.unknowns) for row in rows] == [
