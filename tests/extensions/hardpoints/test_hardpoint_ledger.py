@@ -1,6 +1,7 @@
 """What tables of hardpoints and files beside them have is read, listed, or stops by name."""
 
 import json
+import random
 import re
 
 import pytest
@@ -52,6 +53,52 @@ def test_unknown_name_of_table_is_listed(tmp_path):
     }.items():
         case = load(write(tmp_path, text, name), Supplied(template="double_wishbone"))
         assert NAME in case.source, name
+
+
+def a_table(rng):
+    """Lines of a table, and how many of each sort: comments, facts, columns, points, other rows."""
+    columns = rng.sample(["meaning", "supplier", "mass", "torque"], rng.randint(0, 4))
+    comments = [f"# remark {k}" for k in range(rng.randint(0, 3))]
+    facts = ["# units: mm", "# axes: forward,left,up"]
+    titles = [f"title {k}" for k in range(rng.randint(0, 2))]
+    points = TEMPLATES["double_wishbone"].sample
+    rows = [
+        ",".join([name, *(f"{1000.0 * x:g}" for x in place), *("5" for _ in columns)])
+        for name, place in points.items()
+    ]
+    more = [f"{NAME}{k},1,2,3{',5' * len(columns)}" for k in range(rng.randint(0, 2))]
+    gaps = [f"gap {k},,,{',5' * len(columns)}" for k in range(rng.randint(0, 2))]
+    head = ",".join(["name", "x", "y", "z", *columns])
+    body = [*rows, *more, *gaps]
+    rng.shuffle(body)
+    above = [*comments, *facts, *titles]
+    rng.shuffle(above)
+    counts = {
+        "comments": len(comments),
+        "columns": len(columns),
+        "rows": len(titles) + len(gaps),
+        "points": len(rows) + len(more),
+    }
+    return [*above, head, *body], counts
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_account_of_table_adds_up(seed, tmp_path):
+    """What is read and what is listed are all lines and columns."""
+    lines, counts = a_table(random.Random(seed))
+    table = read_hardpoints(write(tmp_path, "\n".join(lines), "car.csv"))
+    assert (table.unit, table.axes) == ("mm", "forward,left,up")
+    assert len(table.points) == counts["points"]
+    comments = [each for each in table.left_out if "(remark " in each]
+    assert comments == [
+        f"line {k} ({line[2:]})" for k, line in enumerate(lines, 1) if line.startswith("# remark")
+    ]
+    assert len(comments) == counts["comments"]
+    assert sum(each.startswith("column ") for each in table.left_out) == counts["columns"]
+    assert sum(each.startswith("line ") for each in table.left_out) == (
+        counts["rows"] + counts["comments"]
+    )
+    assert len(table.left_out) == counts["comments"] + counts["columns"] + counts["rows"]
 
 
 def test_other_sheets_and_columns_are_listed(tmp_path):

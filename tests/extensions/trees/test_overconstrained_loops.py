@@ -15,6 +15,7 @@ from kincheck import adapters
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import KincheckError, MechanismError
+from kincheck.core.extensions.closing.reduction import reduce_rows
 from kincheck.core.kinematics import NativeSolver, largest_residual
 from scipy.spatial.transform import Rotation
 
@@ -110,6 +111,21 @@ def test_six_hinges_in_second_engine(family, tmp_path):
     ]
     assert np.ptp(tips[0]) > 1e-3
     assert np.abs(tips[0] - tips[1]).max() < tolerance
+
+
+@pytest.mark.by_day(3)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_kept_rows_hold_in_whole_joint(family, tmp_path):
+    """What stays of a hinge is true of the exact linkage at any pose, and not only at the start."""
+    loop = random_loop(family, 2)
+    case, _ = case_of("case", loop, 12, tmp_path, 2)
+    found, bodies = tracks(case, loop)
+    assert found
+    for name in ("j1", "j5", "j3"):
+        carrying = [joint.name for joint in case.mechanism.joints if joint.name != name]
+        less = reduce_rows(case.mechanism, 1e-6, carrying).mechanism
+        if less.reduced:
+            assert largest_residual(less, less.joints, bodies) < 1e-9
 
 
 def test_residual_beyond_tolerance_is_refused(tmp_path):
